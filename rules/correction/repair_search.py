@@ -80,18 +80,18 @@ class _Change(NamedTuple):
 
 
 def least_cost_repairs(
-    text: str, since: int, speller: EditCosts, may_go_on: Callable[[], bool]
+    text: str, since: int, costs: EditCosts, may_go_on: Callable[[], bool]
 ) -> Iterator[Repair]:
     """Corrections of a text, cheapest first; none if the search takes too long.
 
     Args:
         text: A text with a syntax error.
         since: Offset from which it may be edited.
-        speller: Edit costs of its language.
+        costs: Edit costs of its language.
         may_go_on: Called before each explored configuration; stops the search when false.
     """
-    words = list(tokens_of(text, speller.terminals, speller.general))
-    for last in _Search(words, since, speller, may_go_on).found():
+    words = list(tokens_of(text, costs.terminals, costs.general))
+    for last in _Search(words, since, costs, may_go_on).found():
         changes = list(_in_order(last))
         choices = product(*(c.texts or ("",) for c in changes))
         for texts in islice(choices, SPELLINGS_TRIED) if changes else ():
@@ -102,9 +102,9 @@ class _Search:
     """Best-first search over parses of some words, by the cost of their edits."""
 
     def __init__(
-        self, words: list[Word], since: int, speller: EditCosts, may_go_on: Callable[[], bool]
+        self, words: list[Word], since: int, costs: EditCosts, may_go_on: Callable[[], bool]
     ) -> None:
-        self.words, self.speller, self.may_go_on = words, speller, may_go_on
+        self.words, self.edit_costs, self.may_go_on = words, costs, may_go_on
         self.since = sum(w.begin < since for w in words)
         self.heap: list[tuple[float, int, int, Stack, _Change | None, int]] = []
         self.costs: dict[tuple[int, Stack, int], list[float]] = {}
@@ -114,11 +114,11 @@ class _Search:
 
     def found(self) -> Iterator[_Change | None]:
         """The edits of each complete parse, linked from the last."""
-        self.push(0.0, 0, (self.speller.automaton.initial,), None, 0)
+        self.push(0.0, 0, (self.edit_costs.automaton.initial,), None, 0)
         while self.heap and self.may_go_on():
             cost, behind, _, stack, change, put = heappop(self.heap)
             at = -behind
-            if at == len(self.words) and self.speller.automaton.step(stack, END) is not None:
+            if at == len(self.words) and self.edit_costs.automaton.step(stack, END) is not None:
                 yield change
             self.read_on(cost, at, stack, change)
             if at >= self.since:
@@ -137,7 +137,7 @@ class _Search:
         """Consume the next word, as written or as possibly meant."""
         if at == len(self.words):
             return
-        step = self.speller.automaton.step
+        step = self.edit_costs.automaton.step
         for terminal in self.words[at].terminals:
             after = step(stack, terminal)
             if after is not None:
@@ -156,14 +156,14 @@ class _Search:
     def meant_at(self, at: int) -> Sequence[Replacement]:
         """Possible meanings of the words from an index on."""
         if at not in self.meanings:
-            self.meanings[at] = self.speller.replacements(self.words, at)
+            self.meanings[at] = self.edit_costs.replacements(self.words, at)
         return self.meanings[at]
 
     def steps(self, stack: Stack, terminals: Iterable[str]) -> Stack | None:
         """The stack after several terminals; None if one is not accepted."""
         after: Stack | None = stack
         for terminal in terminals:
-            after = None if after is None else self.speller.automaton.step(after, terminal)
+            after = None if after is None else self.edit_costs.automaton.step(after, terminal)
         return after
 
     def put_in(self, cost: float, at: int, stack: Stack, change: _Change | None, put: int) -> None:
@@ -178,16 +178,16 @@ class _Search:
 
     def offers(self, stack: Stack) -> Iterator[tuple[float, tuple[str, ...], Stack]]:
         """Possible insertions: cost, spellings, and the resulting stack."""
-        for terminal in self.speller.automaton.acceptable(stack):
-            price, texts = self.speller.insertions.get(terminal, (0.0, ()))
-            after = self.speller.automaton.step(stack, terminal) if texts else None
+        for terminal in self.edit_costs.automaton.acceptable(stack):
+            price, texts = self.edit_costs.insertions.get(terminal, (0.0, ()))
+            after = self.edit_costs.automaton.step(stack, terminal) if texts else None
             if after is not None:
                 yield price, texts, after
 
     def leave_out(self, cost: float, at: int, stack: Stack, change: _Change | None) -> None:
         """Drop the next word; earlier insertions commute with it."""
         if at < len(self.words):
-            price = self.speller.drop_cost(self.words[at])
+            price = self.edit_costs.drop_cost(self.words[at])
             self.push(cost + price, at + 1, stack, _Change(at, 1, (), change), 0)
 
 

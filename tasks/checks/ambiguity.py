@@ -56,26 +56,26 @@ class AmbiguityCheck:
                 continue
             for course in walk(stage.body):
                 if isinstance(course, Choice):
-                    yield from self.options(course)
+                    yield from self.ambiguous_choices(course)
                 elif isinstance(course, Sequence):
-                    yield from self.turns(course)
+                    yield from self.ambiguous_sequences(course)
 
-    def options(self, choice: Choice) -> Iterator[Diagnostic]:
+    def ambiguous_choices(self, choice: Choice) -> Iterator[Diagnostic]:
         """Alternatives with the same requirements."""
-        seen: dict[int, Course] = {}
+        first_with_form: dict[int, Course] = {}
         for option in choice.options:
-            form = self.forms.of(option)
-            if form is not None and form in seen:
-                what = f"no observation can tell `{option}` from `{seen[form]}`"
+            form = self.normal_forms.of(option)
+            if form is not None and form in first_with_form:
+                what = f"no observation can tell `{option}` from `{first_with_form[form]}`"
                 hint = "take one of them out, or say by what they differ"
                 yield self.fault(what, option.span, hint)
             elif form is not None:
-                seen[form] = option
+                first_with_form[form] = option
 
-    def turns(self, sequence: Sequence) -> Iterator[Diagnostic]:
+    def ambiguous_sequences(self, sequence: Sequence) -> Iterator[Diagnostic]:
         """Adjacent courses with the same requirements and no `for` or condition to separate them."""
         for before, after in zip(sequence.items, sequence.items[1:], strict=False):
-            one, other = self.bare(before), self.bare(after)
+            one, other = self.plain_fact(before), self.plain_fact(after)
             if one is not None and one == other:
                 what = f"no observation can tell where `{before}` ends and `{after}` begins"
                 hint = f"say it once, or how long the first lasts: `{before} for 5 s {after}`"
@@ -85,12 +85,12 @@ class AmbiguityCheck:
         """A fault at the position of a course."""
         return self.source.fault("E230", what, span, hint=hint)
 
-    def bare(self, course: Course) -> Fact | None:
+    def plain_fact(self, course: Course) -> Fact | None:
         """The only action of a course without `for` and conditions, or None."""
         fact = self.grammar.sole_fact(course)
-        return None if fact is None or self.governed(course) else fact
+        return None if fact is None or self.has_clauses(course) else fact
 
-    def governed(self, course: Course) -> bool:
+    def has_clauses(self, course: Course) -> bool:
         """Whether a course has a `for` or condition around its only action."""
         for _ in range(DEEPEST):
             match course:
@@ -110,12 +110,12 @@ class AmbiguityCheck:
         return True
 
     @cached_property
-    def forms(self) -> _Forms:
+    def normal_forms(self) -> _NormalForms:
         """The normal forms of all stages."""
-        return _Forms(self.grammar)
+        return _NormalForms(self.grammar)
 
 
-class _Forms:
+class _NormalForms:
     """Numbers courses by their normal forms with stages expanded: equal numbers look the same.
 
     Equal parts share a number, so that a stage that is referred to often is processed once.

@@ -37,7 +37,7 @@ MOST_STAGES = 2_000
 minute."""
 DEEPEST_STAGES = 100
 """Maximum nesting of stages, limited by Python's recursion depth."""
-MOST_WAYS = 500
+MOST_START_STATES = 500
 """Maximum number of initial states of a course. With 256 a step takes 10 ms, with 4,000 half a second;
 parallel alternatives multiply."""
 MOST_TOGETHER = 12
@@ -97,10 +97,10 @@ class BoundsCheck:
                 what = f"stage `<{name}>` has more than {DEEPEST_STAGES} stages inside one another"
                 hint = "write those that follow one another side by side"
                 yield self.source.fault("E239", what, place, hint=hint)
-            if self._ways[name] > MOST_WAYS:
-                what = f"stage `<{name}>` may begin in {self._counted(name)} ways"
+            if self._start_counts[name] > MOST_START_STATES:
+                what = f"stage `<{name}>` may begin in {self._start_count_text(name)} ways"
                 hint = "use fewer alternatives at the same time"
-                yield self.source.fault("E239", what, place, f"at most {MOST_WAYS}", hint)
+                yield self.source.fault("E239", what, place, f"at most {MOST_START_STATES}", hint)
 
     @cached_property
     def _order(self) -> list[str]:
@@ -116,42 +116,50 @@ class BoundsCheck:
         return depths
 
     @cached_property
-    def _ways(self) -> dict[str, int]:
-        ways: dict[str, int] = {}
+    def _start_counts(self) -> dict[str, int]:
+        start_counts: dict[str, int] = {}
         for name in self._order:
             body = self.grammar.stages[name].body
-            ways[name] = 1
+            start_counts[name] = 1
             if not isinstance(body, Actors):
                 # Also later states: an inner course may branch more than the beginning.
                 inside = (c for c in walk(body) if isinstance(c, Together))
-                most = max((self._begins(c, ways) for c in inside), default=1)
-                ways[name] = min(max(most, self._begins(body, ways)), MOST_WAYS**2)
-        return ways
+                most = max((self._start_count(c, start_counts) for c in inside), default=1)
+                start_counts[name] = min(
+                    max(most, self._start_count(body, start_counts)), MOST_START_STATES**2
+                )
+        return start_counts
 
-    def _begins(self, course: Course, ways: dict[str, int]) -> int:
+    def _start_count(self, course: Course, start_counts: dict[str, int]) -> int:
         """Upper bound of the number of initial states of a course, counting being skipped as one."""
         match course:
             case Reference(stage=name):
-                return ways.get(name, 1)
+                return start_counts.get(name, 1)
             case Choice(options=parts) | AnyOrder(items=parts):
-                return sum(self._begins(p, ways) for p in parts)
+                return sum(self._start_count(p, start_counts) for p in parts)
             case Together(parts=parts):
-                return prod(min(self._begins(p, ways), MOST_WAYS) for p in parts)
+                return prod(
+                    min(self._start_count(p, start_counts), MOST_START_STATES) for p in parts
+                )
             case Repeated(item=item) | Counted(item=item):
-                return self._begins(item, ways) + 1
+                return self._start_count(item, start_counts) + 1
             case Timed(item=item) | Conditioned(item=item):
-                return self._begins(item, ways)
+                return self._start_count(item, start_counts)
             case Sequence(items=items):
-                return self._of_sequence(items, ways)
+                return self._sequence_start_count(items, start_counts)
         return 1
 
-    def _of_sequence(self, items: tuple[Course, ...], ways: dict[str, int]) -> int:
+    def _sequence_start_count(self, items: tuple[Course, ...], start_counts: dict[str, int]) -> int:
         total = 0
         for item in items:
-            total += self._begins(item, ways)
+            total += self._start_count(item, start_counts)
             if not self.grammar.nullable(item):
                 break
         return total
 
-    def _counted(self, name: str) -> str:
-        return str(self._ways[name]) if self._ways[name] < MOST_WAYS**2 else "countless"
+    def _start_count_text(self, name: str) -> str:
+        return (
+            str(self._start_counts[name])
+            if self._start_counts[name] < MOST_START_STATES**2
+            else "countless"
+        )

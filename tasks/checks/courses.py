@@ -47,14 +47,14 @@ class CourseCheck:
         task: The task, with at least one rule.
         source: For positions.
         actions: The known actions.
-        whole: Whether all referenced stages are defined.
+        all_defined: Whether all referenced stages are defined.
         grammar: The grammar of the task.
     """
 
     task: Task
     source: Source
     actions: Mapping[str, ActionDefinition]
-    whole: bool
+    all_defined: bool
     grammar: Grammar
 
     @cached_property
@@ -65,7 +65,7 @@ class CourseCheck:
 
     def faults(self) -> Iterator[Diagnostic]:
         """All faults of the courses."""
-        yield from self.endless()
+        yield from self.non_terminating()
         yield from self.conditions()
         yield from self.counts()
         yield from self.clauses()
@@ -74,16 +74,16 @@ class CourseCheck:
         yield from self.invariants()
         yield from self.repetitions()
 
-    def endless(self) -> Iterator[Diagnostic]:
+    def non_terminating(self) -> Iterator[Diagnostic]:
         """Stages that cannot begin or terminate."""
-        begins = self.grammar.left_recursive()
-        for stage in begins:
+        left_recursive = self.grammar.left_recursive()
+        for stage in left_recursive:
             what = f"stage `<{stage.name}>` begins with itself and so never begins"
             hint = f"let something come first, such as `<try> | <try> <{stage.name}>`"
             yield self.source.fault(
                 "E206", what, stage.span, "an action before it comes again", hint
             )
-        if begins or not self.whole:
+        if left_recursive or not self.all_defined:
             return
         for stage in self.grammar.non_terminating():
             what = f"stage `<{stage.name}>` can never end"
@@ -118,9 +118,9 @@ class CourseCheck:
                 most = delay.most or delay.duration
                 if value(self.task.amount(most)) < value(self.task.amount(delay.duration)):
                     what = f"`{delay}` is never: the greatest delay is less than the least"
-                    turned = f"write `after {most} to {delay.duration}` in place of `{delay}`"
+                    swapped = f"write `after {most} to {delay.duration}` in place of `{delay}`"
                     expected = "a greater number after `to`"
-                    yield self.source.fault("E208", what, delay.span, expected, turned)
+                    yield self.source.fault("E208", what, delay.span, expected, swapped)
             if holds and self.grammar.is_sequential(course.item):
                 what = f"`{holds[0]}` comes after a sequence"
                 hint = "put `for` after the one that must hold"
@@ -145,11 +145,11 @@ class CourseCheck:
             parts = [self.grammar.sole_fact(p) for p in course.parts]
             for i, a in enumerate(parts):
                 for b in parts[i + 1 :]:
-                    if a and b and self.excluding(a, b):
+                    if a and b and self.mutually_exclusive(a, b):
                         what = f"`{a}` and `{b}` can never hold at the same time"
                         yield self.source.fault("E209", what, course.span, hint="in turn is `a b`")
 
-    def excluding(self, a: Fact, b: Fact) -> bool:
+    def mutually_exclusive(self, a: Fact, b: Fact) -> bool:
         """Whether two facts can never hold at the same time."""
         if isinstance(a, Action) and isinstance(b, Action):
             return self.contradict(a, b)
@@ -165,52 +165,55 @@ class CourseCheck:
     def invariants(self) -> Iterator[Diagnostic]:
         """Invariants that the task itself breaks."""
         for invariant in self.task.invariants:
-            meant = self.meant(invariant.during)
+            affected = self.affected_stages(invariant.during)
             for stage, fact in self.grammar.asked:
-                if stage in meant and self.breaks(invariant, fact):
+                if stage in affected and self.violates(invariant, fact):
                     what = f"`{invariant}`, but stage `<{stage}>` asks for `{fact}`"
                     hint = "say for which stage it is meant with `during <stage>`"
                     yield self.source.fault("E210", what, invariant.span, hint=hint)
                     break
 
-    def meant(self, during: tuple[Reference, ...]) -> AnySet[str]:
+    def affected_stages(self, during: tuple[Reference, ...]) -> AnySet[str]:
         """The stages to which an invariant applies, with those inside them."""
         if not during:
             return self.grammar.stages.keys()
         known = [r.stage for r in during if r.stage in self.grammar.stages]
         return reachable(self.grammar.mentions, known)
 
-    def breaks(self, invariant: Invariant, fact: Fact) -> bool:
+    def violates(self, invariant: Invariant, fact: Fact) -> bool:
         """Whether a requirement of a stage breaks an invariant."""
-        said = invariant.condition
-        if not isinstance(said, Action) or not isinstance(fact, Action):
-            return invariant.when == "never" and str(said) == str(fact)
+        required = invariant.condition
+        if not isinstance(required, Action) or not isinstance(fact, Action):
+            return invariant.when == "never" and str(required) == str(fact)
         if invariant.when == "never":
-            return (fact.name, {*fact.words}) == (said.name, {*said.words})
-        return self.contradict(said, fact)
+            return (fact.name, {*fact.words}) == (required.name, {*required.words})
+        return self.contradict(required, fact)
 
     def conditions(self) -> Iterator[Diagnostic]:
         """Stage conditions that are duplicate or ineffective."""
         for course in self.courses:
             if not isinstance(course, Conditioned):
                 continue
-            told: set[str] = set()
-            for sign in course.conditions:
-                if sign.kind in told:
-                    what = f"`{sign.kind} when` is given twice"
+            kinds: set[str] = set()
+            for condition in course.conditions:
+                if condition.kind in kinds:
+                    what = f"`{condition.kind} when` is given twice"
                     hint = "join the conditions with `or` or `and`"
                     yield self.source.fault(
-                        "E235", what, sign.span, f"one `{sign.kind} when`", hint
+                        "E235", what, condition.span, f"one `{condition.kind} when`", hint
                     )
-                told.add(sign.kind)
-                if sign.kind == "pauses" and self.grammar.sole_fact(course.item) == sign.condition:
-                    what = f"what is asked for, `{sign.condition}`, also pauses it, so it is never done"
-                    yield self.source.fault("E208", what, sign.span, "another condition")
-                if sign.kind in ("begins", "ends") and self.grammar.is_sequential(course.item):
-                    what = f"`{sign.kind} when` comes after a sequence"
-                    hint = f"put it after the one that {sign.kind} so"
+                kinds.add(condition.kind)
+                if (
+                    condition.kind == "pauses"
+                    and self.grammar.sole_fact(course.item) == condition.condition
+                ):
+                    what = f"what is asked for, `{condition.condition}`, also pauses it, so it is never done"
+                    yield self.source.fault("E208", what, condition.span, "another condition")
+                if condition.kind in ("begins", "ends") and self.grammar.is_sequential(course.item):
+                    what = f"`{condition.kind} when` comes after a sequence"
+                    hint = f"put it after the one that {condition.kind} so"
                     expected = "one action, or several at the same time"
-                    yield self.source.fault("E232", what, sign.span, expected, hint)
+                    yield self.source.fault("E232", what, condition.span, expected, hint)
 
     def counts(self) -> Iterator[Diagnostic]:
         """Contradictory counts, and `any order` with too many items."""
@@ -227,10 +230,10 @@ class CourseCheck:
                 yield from self.rounds(course)
             if isinstance(course, AnyOrder) and (course.count or 0) > len(course.items):
                 what = f"{course.count} of {len(course.items)} things are never done"
-                said = f"any {len(course.items)} of"
-                hint = f"write `{said}` in place of `any {course.count} of`"
+                corrected = f"any {len(course.items)} of"
+                hint = f"write `{corrected}` in place of `any {course.count} of`"
                 yield self.source.fault(
-                    "E233", what, course.span, f"`{said}`, or more things", hint
+                    "E233", what, course.span, f"`{corrected}`, or more things", hint
                 )
             if isinstance(course, AnyOrder) and len(course.items) > MOST_IN_ANY_ORDER:
                 what = f"{len(course.items)} things in any order have too many orders to follow"

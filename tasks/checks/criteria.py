@@ -16,17 +16,17 @@ from visup.tasks.grammar.nodes import Actor, Name, Task
 from visup.tasks.grammar.structure import machines_of
 from visup.tasks.grammar.units import value
 
-MANY = 500
+MOST_COMPARED = 500
 """Most names that are compared with each other."""
-ALIKE = 0.85
+LEAST_SIMILARITY = 0.85
 """Similarity from which two names are considered the same."""
-OPPOSITES = ({"largest", "smallest"}, {"leftmost", "rightmost"}, {"highest", "lowest"})
+CONTRARY_RANKS = ({"largest", "smallest"}, {"leftmost", "rightmost"}, {"highest", "lowest"})
 
 
 def criteria_faults(task: Task, source: Source) -> Iterator[Diagnostic]:
     """One fault for each actor with unsatisfiable criteria, or that is a part of itself."""
     for actor in (*task.actors, *task.bystanders):
-        why = _impossible(task, actor)
+        why = _contradiction(task, actor)
         if why:
             what = f"no object can be actor `{actor.name}`: {why}"
             expected = "criteria that one object can meet; models and colours are separated by `or`"
@@ -37,7 +37,7 @@ def criteria_faults(task: Task, source: Source) -> Iterator[Diagnostic]:
             yield source.fault("E237", what, span, "`actor gripper is part of arm`")
 
 
-def _impossible(task: Task, actor: Actor) -> str:
+def _contradiction(task: Task, actor: Actor) -> str:
     """Why no object can meet the criteria of an actor, or empty."""
     criteria = actor.criteria
     others = [c for c in criteria if isinstance(c, OtherModels)]
@@ -48,7 +48,7 @@ def _impossible(task: Task, actor: Actor) -> str:
         if len(several) > 1:
             return f"`{several[0]}` and `{several[1]}` are two {what}"
     ranks = {c.rank for c in criteria if isinstance(c, Ranked)}
-    for pair in OPPOSITES:
+    for pair in CONTRARY_RANKS:
         if pair <= ranks:
             return f"`the {'` and `the '.join(sorted(pair))}` are two"
     sizes = [c for c in criteria if isinstance(c, Extent)]
@@ -66,45 +66,47 @@ def _circular(task: Task, actor: Actor) -> bool:
 
 
 @dataclass(frozen=True)
-class TakingPart:
+class ActorUseCheck:
     """Checks which actors take part, by the actions that name them.
 
     Attributes:
         task: The tree.
         source: For positions.
-        asked: Every action of the file: its name, its actors, its place.
+        uses: Every action of the file: its name, its actors, its place.
         undefined: Names of stages that are referred to and not defined.
     """
 
     task: Task
     source: Source
-    asked: Sequence[tuple[str, tuple[Name, ...], Span]]
+    uses: Sequence[tuple[str, tuple[Name, ...], Span]]
     undefined: Collection[str]
 
-    def misspelt(self) -> Iterator[Diagnostic]:
+    def misspelt_actors(self) -> Iterator[Diagnostic]:
         """Probable misspellings: actors named once that resemble another one declared or named more often."""
         machines = [a.machine for a in self.task.actors if a.machine is not None]
-        counts = Counter(str(a) for _, actors, _ in self.asked for a in actors)
+        counts = Counter(str(a) for _, actors, _ in self.uses for a in actors)
         counts.update(map(str, machines))
         declared = {a.name for a in self.task.actors} | {z.name for z in self.task.zones}
-        sure = [o for o in dict.fromkeys((*declared, *counts)) if o in declared or counts[o] > 1]
-        if len(sure) > MANY:
+        reliable = [
+            o for o in dict.fromkeys((*declared, *counts)) if o in declared or counts[o] > 1
+        ]
+        if len(reliable) > MOST_COMPARED:
             return
-        for actors in (*(actors for _, actors, _ in self.asked), machines):
+        for actors in (*(actors for _, actors, _ in self.uses), machines):
             for actor in actors:
                 name = str(actor)
                 if name in declared or counts[name] > 1:
                     continue
-                meant = next((o for o in sure if _is_misspelling(name, o)), None)
-                if meant is not None:
+                intended = next((o for o in reliable if _is_misspelling(name, o)), None)
+                if intended is not None:
                     what = f"actor `{name}` is named only here"
                     yield self.source.fault(
-                        "E214", what, actor.span, hint=f"did you mean `{meant}`?"
+                        "E214", what, actor.span, hint=f"did you mean `{intended}`?"
                     )
 
-    def idle(self) -> Iterator[Diagnostic]:
+    def unused_actors(self) -> Iterator[Diagnostic]:
         """Declared actors that no action names."""
-        named = {str(a) for _, actors, _ in self.asked for a in actors}
+        named = {str(a) for _, actors, _ in self.uses for a in actors}
         named |= {m for a in named for m in machines_of(self.task, a)}
         named |= {a for stage in self.undefined for a in re.findall(r"\w+", stage)}
         for actor in self.task.actors:
@@ -122,5 +124,8 @@ def _is_misspelling(name: str, other: str) -> bool:
     """Whether one name is probably a misspelling of another; `arm1` is none of `arm2`."""
     if name == other or name.rstrip("0123456789_") == other.rstrip("0123456789_"):
         return False
-    turned = len(name) > 3 and name[0] == other[0] and sorted(name) == sorted(other)
-    return turned or SequenceMatcher(None, name.casefold(), other.casefold()).ratio() >= ALIKE
+    transposed = len(name) > 3 and name[0] == other[0] and sorted(name) == sorted(other)
+    return (
+        transposed
+        or SequenceMatcher(None, name.casefold(), other.casefold()).ratio() >= LEAST_SIMILARITY
+    )

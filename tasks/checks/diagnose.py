@@ -11,14 +11,14 @@ from visup.rules.language.fixes import pointing
 from visup.tasks.actions.actions import ALL_PERCEPTS, ActionDefinition, known_actions
 from visup.tasks.checks.bounds import MOST_FAULTS, text_fault
 from visup.tasks.checks.files import include_root, read_beside
-from visup.tasks.checks.repairs import with_tried_hints
+from visup.tasks.checks.repairs import with_tested_hints
 from visup.tasks.checks.semantics import check_semantics
 from visup.tasks.diagnostics.includes import Read, join_included
 from visup.tasks.diagnostics.normalise import normalise
 from visup.tasks.diagnostics.recovery import parse
 from visup.tasks.grammar.nodes import Task
 
-FOREIGN = ("E121", "E127")  # text in another language is not checked for characters
+FOREIGN_LANGUAGE_CODES = ("E121", "E127")  # text in another language is not checked for characters
 
 
 def diagnose(
@@ -41,18 +41,18 @@ def diagnose(
         The parsed tree with includes, and the first hundred faults in the order of the text, those of
         included files last; the tree is valid only without faults.
     """
-    task, faults = _ordered(text, file, actions, percepts, read)
+    task, faults = _sorted_faults(text, file, actions, percepts, read)
     if not faults:
         return task, faults
 
     def check(changed: str) -> list[Diagnostic]:
-        return _ordered(changed, file, actions, percepts, read)[1]
+        return _sorted_faults(changed, file, actions, percepts, read)[1]
 
-    hinted = with_tried_hints(text, faults, check)
+    hinted = with_tested_hints(text, faults, check)
     return task, [pointing(text, f) if f.place.file == file else f for f in hinted]
 
 
-def _ordered(
+def _sorted_faults(
     text: str,
     file: str,
     actions: Mapping[str, ActionDefinition] | None,
@@ -64,7 +64,7 @@ def _ordered(
     if (fault := text_fault(text, source)) is not None:
         return Task(()), [fault]
     try:
-        task, faults = _diagnosed(text, source, actions, percepts, read)
+        task, faults = _parsed_and_checked(text, source, actions, percepts, read)
     except RecursionError:
         what = "things are nested too deeply"
         return Task(()), [Diagnostic("E128", what, source.place(1, 1))]
@@ -72,20 +72,20 @@ def _ordered(
     return task, sorted(faults, key=lambda f: _order(f, order))[:MOST_FAULTS]
 
 
-def _diagnosed(
+def _parsed_and_checked(
     text: str,
     source: Source,
     actions: Mapping[str, ActionDefinition] | None,
     percepts: AnySet[str],
     read: Read | None,
 ) -> tuple[Task, list[Diagnostic]]:
-    cleaned, odd = normalise(text, source)
-    within = partial(read_beside, root=include_root(source.file))
-    parsed = join_included(parse(cleaned, source), source, read or within)
-    foreign = {f.place.line for f in parsed.faults if f.code in FOREIGN}
-    odd = [f for f in odd if f.place.line not in foreign]
+    cleaned, odd_characters = normalise(text, source)
+    read_default = partial(read_beside, root=include_root(source.file))
+    parsed = join_included(parse(cleaned, source), source, read or read_default)
+    foreign = {f.place.line for f in parsed.faults if f.code in FOREIGN_LANGUAGE_CODES}
+    odd_characters = [f for f in odd_characters if f.place.line not in foreign]
     known = known_actions() if actions is None else actions
-    faults = [*odd, *parsed.faults, *check_semantics(parsed, source, known, percepts)]
+    faults = [*odd_characters, *parsed.faults, *check_semantics(parsed, source, known, percepts)]
     if not faults and not any(not s.span.file for s in parsed.task.stages):
         expected = "a rule such as `<dock> ::= converging(arm, satellite)`"
         faults = [Diagnostic("E129", "there is no rule", source.place(1, 1), expected=expected)]

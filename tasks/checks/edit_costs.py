@@ -1,4 +1,4 @@
-"""Corrections that make a statement of a task file parse: what changing its words costs, and the hints."""
+"""Corrections that make a statement of a task file parse: the costs of edits, and the hints."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from visup.rules.language.diagnostics import Source
 from visup.rules.language.fixes import fix_of
 from visup.rules.language.synonyms import synonym
 from visup.tasks.actions.actions import ACTIONS, known_actions
-from visup.tasks.diagnostics.course_error_patterns import SIGNS_MEANT
+from visup.tasks.diagnostics.course_error_patterns import CONDITION_SYNONYMS
 from visup.tasks.diagnostics.normalise import normalise
 from visup.tasks.diagnostics.recovery import KEYWORDS, NEVER_NAMES, split
 from visup.tasks.grammar.parser import parser
@@ -34,7 +34,7 @@ LONGEST_NAME = 4
 """Maximum number of words that may be meant as one name."""
 ANY_NAME = ("NAME", "UNIT", "MODEL")
 """Terminals that match any word."""
-_PUT_IN = {
+_INSERTION_COSTS = {
     ")": 1.0, "(": 1.0, ",": 1.0, ":": 1.0, "&": 1.6, "=": 1.2, "when": 0.8, "order": 0.5, "of": 0.6,
     "each": 0.8, "to": 0.9, "least": 0.8, "most": 0.8, "times": 0.5, "than": 0.5, "first": 0.5, "from": 0.5,
     "ignored": 0.5, "is": 0.9, "and": 1.3, "for": 1.3, "within": 1.4, "at": 1.0, "the": 0.4, "largest": 1.6,
@@ -44,7 +44,7 @@ _PUT_IN = {
 }  # fmt: skip
 """Cost of inserting a word."""
 _BRACKETS = {"[": "(", "]": ")", "{": "(", "}": ")"}
-_BEGINNINGS = {
+_STATEMENT_WORDS = {
     "actor": "object|entity|robot|agent|player|model|item|thing|body|actors",
     "parameter": "param|params|const|constant|let|set|define|def|var|variable|parameters|value",
     "zone": "area|region|place|rect|rectangle|polygon|zones",
@@ -54,19 +54,21 @@ _BEGINNINGS = {
     "always": "ensure|require|requires|must|invariant|assert|keep|maintain|immer|toujours|siempre",
     "bystander": "ignore|bystanders|ignored|ignoring",
 }
-_STATEMENT = {word: meant for meant, words in _BEGINNINGS.items() for word in words.split("|")}
-_RANKS = {"biggest": "largest", "tallest": "largest", "longest": "largest", "tiniest": "smallest",
+_STATEMENT_SYNONYMS = {
+    word: meant for meant, words in _STATEMENT_WORDS.items() for word in words.split("|")
+}
+_RANK_SYNONYMS = {"biggest": "largest", "tallest": "largest", "longest": "largest", "tiniest": "smallest",
           "topmost": "highest", "uppermost": "highest", "top": "highest", "bottom": "lowest",
           "nearest": "lowest", "bottommost": "lowest"}  # fmt: skip
-_LASTING = {"bigger": "larger", "longer": "larger", "taller": "larger", "shorter": "smaller",
+_CRITERION_SYNONYMS = {"bigger": "larger", "longer": "larger", "taller": "larger", "shorter": "smaller",
             "moved": "moves", "starts": "moves", "comes": "enters", "came": "enters",
             "arrives": "enters", "appears": "enters", "entered": "enters", "stays": "rests",
             "stands": "rests", "lies": "rests", "who": "what", "which": "what"}  # fmt: skip
 _CALLS = re.compile(rf"({NAME})\s*\(([^()<>]*)\)")
 
 
-def speller(text: str) -> EditCosts:
-    """The speller for a task file.
+def task_edit_costs(text: str) -> EditCosts:
+    """The edit costs for a task file.
 
     Args:
         text: The whole file, for its names.
@@ -74,10 +76,15 @@ def speller(text: str) -> EditCosts:
     calls = [(m[1], re.findall(NAME, m[2])) for m in _CALLS.finditer(text)]
     actors = tuple(dict.fromkeys(a for _, names in calls for a in names if a not in NEVER_NAMES))
     stages = frozenset(re.findall(rf"<\s*({NAME})\s*>\s*:", text))
-    put = {**_put(), "NAME": (2.2, (*actors[:3], "other"))}
-    meanings = _Meanings(stages)
+    insertions = {**_insertions(), "NAME": (2.2, (*actors[:3], "other"))}
+    meanings = _Replacements(stages)
     return EditCosts(
-        _automaton(), _terminals(), put, _drops({*actors, *stages}), meanings, ("MODEL",)
+        _automaton(),
+        _terminals(),
+        insertions,
+        _deletion_cost({*actors, *stages}),
+        meanings,
+        ("MODEL",),
     )
 
 
@@ -97,9 +104,9 @@ def _terminals_of(word: str) -> tuple[str, ...]:
 
 
 @lru_cache(maxsize=1)
-def _put() -> Mapping[str, tuple[float, tuple[str, ...]]]:
+def _insertions() -> Mapping[str, tuple[float, tuple[str, ...]]]:
     found: dict[str, tuple[float, tuple[str, ...]]] = {}
-    for word, cost in _PUT_IN.items():
+    for word, cost in _INSERTION_COSTS.items():
         for terminal in _terminals_of(word):
             found.setdefault(terminal, (cost, (word,)))
     found["HEAD"] = (3.0, ("<task> ::=",))
@@ -108,10 +115,10 @@ def _put() -> Mapping[str, tuple[float, tuple[str, ...]]]:
     return MappingProxyType(found)
 
 
-def _drops(names: set[str]) -> Callable[[Word], float]:
+def _deletion_cost(names: set[str]) -> Callable[[Word], float]:
     known = names | set(known_actions())
 
-    def drop(word: Word) -> float:
+    def cost(word: Word) -> float:
         if word.text in known or word.text[0] in '<"':
             return KNOWN_COST
         if word.text.casefold() in FILLERS or word.text in (";", ".", "->", "then", "next", "by"):
@@ -122,11 +129,11 @@ def _drops(names: set[str]) -> Callable[[Word], float]:
             return 2.0
         return 1.6 if word.text in KEYWORDS else WORD_COST
 
-    return drop
+    return cost
 
 
-class _Things:
-    """Possible names of things: all words that are neither of the language nor relations."""
+class _ObjectNames:
+    """Possible names of objects: all words that are neither keywords nor relations."""
 
     def __contains__(self, word: object) -> bool:
         return (
@@ -138,23 +145,23 @@ class _Things:
         )
 
 
-def plain_call(said: str) -> str:
+def plain_call(phrase: str) -> str:
     """A phrase in plain words as an action; unchanged if it is none."""
-    words = said.split()
+    words = phrase.split()
     while words and words[0].casefold() in FILLERS:
         words = words[1:]
-    found = sentences(words, _Things(), _verb)
-    return next((called(call) for n, call in found if n == len(words)), said)
+    found = sentences(words, _ObjectNames(), _action_with_actors)
+    return next((called(call) for n, call in found if n == len(words)), phrase)
 
 
-def _verb(word: str, things: int) -> str | None:
+def _action_with_actors(word: str, things: int) -> str | None:
     """The action with this number of actors meant by a word, or None."""
-    known = _of_arity(things)
+    known = _actions_of_arity(things)
     return word if word in known else synonym(word, known)
 
 
 @lru_cache(maxsize=2)
-def _of_arity(things: int) -> tuple[str, ...]:
+def _actions_of_arity(things: int) -> tuple[str, ...]:
     return tuple(
         name
         for name, action in {**ACTIONS, **known_actions()}.items()
@@ -162,21 +169,21 @@ def _of_arity(things: int) -> tuple[str, ...]:
     )
 
 
-def _head_of(said: Sequence[str]) -> tuple[int, str] | None:
+def _foreign_head(words: Sequence[str]) -> tuple[int, str] | None:
     """Number of words that begin a rule in a nonstandard form, and the name of its stage."""
     line, ends = "", []
-    for word in said:
-        line += f" {word}"
+    for text in words:
+        line += f" {text}"
         ends.append(len(line))
-    m = _HEAD.match(line)
-    if m is None or m[1] in KEYWORDS:
+    match = _HEAD.match(line)
+    if match is None or match[1] in KEYWORDS:
         return None
-    return sum(end <= m.end() for end in ends), _stage_name(m[1])
+    return sum(end <= match.end() for end in ends), _stage_name(match[1])
 
 
-def _stage_name(said: str) -> str:
+def _stage_name(phrase: str) -> str:
     """A valid stage name made from words."""
-    name = re.sub(r"\W+", "_", said.strip()).strip("_")
+    name = re.sub(r"\W+", "_", phrase.strip()).strip("_")
     return name if name[:1].isalpha() else f"stage_{name}"
 
 
@@ -189,7 +196,7 @@ _HEAD = re.compile(
 )
 
 
-class _Meanings:
+class _Replacements:
     """Possible meanings of words by position.
 
     Args:
@@ -198,80 +205,82 @@ class _Meanings:
 
     def __init__(self, stages: frozenset[str]) -> None:
         self.stages = stages
-        self.names = _Things()
+        self.names = _ObjectNames()
 
     def __call__(self, words: Sequence[Word], at: int) -> list[Replacement]:
-        """See `Speller.meant`."""
-        said = [w.text for w in words[at : at + LONGEST]]
+        """See `EditCosts.replacements`."""
+        texts = [w.text for w in words[at : at + LONGEST]]
         found = [
             Replacement(length, (terminal,), meant, cost)
-            for length, meant, cost in self.of(said[:LONGEST_NAME], at == 0)
+            for length, meant, cost in self.meanings(texts[:LONGEST_NAME], at == 0)
             for terminal in (("NAME",) if meant.endswith("_1") else _kinds(meant))
         ]
-        for length, call in sentences(said, self.names, _verb):
+        for length, call in sentences(texts, self.names, _action_with_actors):
             found.append(
                 Replacement(length, terminals_of_call(len(call) - 1), called(call), LIKELY)
             )
-        if said[0] in self.names and len(said) > 1 and said[1] in ("<", ">", "<=", ">="):
+        if texts[0] in self.names and len(texts) > 1 and texts[1] in ("<", ">", "<=", ">="):
             read = ("SIGNAL", "LPAR", "NAME", "RPAR")
-            found.append(Replacement(1, read, f"signal({said[0]})", GUESS))
-        if said[0] == "<" and (ref := _REFERENCE.match(" ".join(said))):
+            found.append(Replacement(1, read, f"signal({texts[0]})", GUESS))
+        if texts[0] == "<" and (ref := _REFERENCE.match(" ".join(texts))):
             found.append(
                 Replacement(ref[0].count(" ") + 1, ("STAGE",), f"<{_stage_name(ref[1])}>", LIKELY)
             )
-        if at == 0 and _STAGE.fullmatch(said[0]):
-            found.append(Replacement(1, ("HEAD",), f"{said[0]} ::=", LIKELY))
-        if at == 0 and (head := _head_of(said)) is not None:
+        if at == 0 and _STAGE.fullmatch(texts[0]):
+            found.append(Replacement(1, ("HEAD",), f"{texts[0]} ::=", LIKELY))
+        if at == 0 and (head := _foreign_head(texts)) is not None:
             found.append(Replacement(head[0], ("HEAD",), f"<{head[1]}> ::=", LIKELY))
         return found
 
-    def of(self, said: Sequence[str], first: bool) -> Iterator[tuple[int, str, float]]:
+    def meanings(self, words: Sequence[str], first: bool) -> Iterator[tuple[int, str, float]]:
         """(Number of words, meaning, cost) of the first words."""
-        word, called = said[0], len(said) > 1 and said[1] == "("
-        low = word.casefold()
-        for length, meant in meanings_of(said):
-            if not (called and length == 1):
+        word, is_call = words[0], len(words) > 1 and words[1] == "("
+        folded = word.casefold()
+        for length, meant in meanings_of(words):
+            if not (is_call and length == 1):
                 yield length, meant, LIKELY
-                yield from ((length, s, GUESS) for s in _IN_COURSES.get(meant, ()))
+                yield from ((length, s, GUESS) for s in _COURSE_OPERATORS.get(meant, ()))
         tables = (
             UNITS_MEANT,
             _BRACKETS,
-            _RANKS,
-            _LASTING,
-            SIGNS_MEANT,
-            _STATEMENT if first else {},
+            _RANK_SYNONYMS,
+            _CRITERION_SYNONYMS,
+            CONDITION_SYNONYMS,
+            _STATEMENT_SYNONYMS if first else {},
         )
-        yield from ((1, table[low], LIKELY) for table in tables if low in table)
-        yield from ((1, sign, GUESS) for sign in _IN_COURSES.get(low, ()))
-        if low in ("=", ":", "as", "be", "has", "means"):
+        yield from ((1, table[folded], LIKELY) for table in tables if folded in table)
+        yield from ((1, sign, GUESS) for sign in _COURSE_OPERATORS.get(folded, ()))
+        if folded in ("=", ":", "as", "be", "has", "means"):
             yield 1, "is", LIKELY
         if word[0].isalpha():
-            yield from self.of_name(said, called)
+            yield from self.name_meanings(words, is_call)
 
-    def of_name(self, said: Sequence[str], called: bool) -> Iterator[tuple[int, str, float]]:
+    def name_meanings(
+        self, words: Sequence[str], is_call: bool
+    ) -> Iterator[tuple[int, str, float]]:
         """The meanings of a word of letters."""
-        word = said[0]
-        for length in range(2, len(said) + 1):
-            joined = "_".join(said[:length]).replace("_-_", "_")
+        word = words[0]
+        for length in range(2, len(words) + 1):
+            joined = "_".join(words[:length]).replace("_-_", "_")
             if joined in known_actions():
                 yield length, joined, LIKELY
-        if word in self.stages and not called:
+        if word in self.stages and not is_call:
             yield 1, f"<{word}>", LIKELY
         if word in KEYWORDS:
-            if called or (len(said) > 1 and said[1] in ",)"):
+            if is_call or (len(words) > 1 and words[1] in ",)"):
                 yield 1, f"{word}_1", GUESS
         elif word.casefold() in KEYWORDS:
             yield 1, word.casefold(), SURE
-        elif not called and len(word) > 2:
+        elif not is_call and len(word) > 2:
             near = close_matches(word.casefold(), KEYWORDS, n=3)
             yield from ((1, meant, GUESS) for meant in near)
-        if called and word not in known_actions():
+        if is_call and word not in known_actions():
             named = synonym(word, ACTIONS) or closest(word, known_actions())
             if named is not None:
                 yield 1, named, LIKELY
 
 
-_IN_COURSES = {"and": ("&",), "or": ("|",), "/": ("|",), "||": ("|",), "&&": ("&",), "if": ("when",),
+_COURSE_OPERATORS = {"and": ("&",), "or": ("|",), "/": ("|",), "||": ("|",), "&&": ("&",), "if": ("when",),
                "while": ("when", "&"), "until": ("ends",)}  # fmt: skip
 """Words of conditions and of other languages -> operators of courses."""
 
@@ -282,13 +291,15 @@ def _kinds(meant: str) -> tuple[str, ...]:
     return _terminals_of(meant) or ("NAME",)
 
 
-WIDENED, MOST_SAID = 6, 120
+MOST_WIDENINGS, LONGEST_QUOTE = 6, 120
 """How often a change is widened by a word to be unambiguous, and its maximum length in characters."""
 LONGEST_STATEMENT = 1500
 """Maximum characters of a statement that is searched completely for the cause of an error."""
 
 
-def corrected(text: str, place: SourceLocation, may_go_on: Callable[[], bool]) -> Iterator[str]:
+def correction_hints(
+    text: str, place: SourceLocation, may_go_on: Callable[[], bool]
+) -> Iterator[str]:
     """Hints that make the statement at a position parse, smallest changes first.
 
     Args:
@@ -300,30 +311,30 @@ def corrected(text: str, place: SourceLocation, may_go_on: Callable[[], bool]) -
         Hints, including those that only delete words.
     """
     cleaned = normalise(text, Source(text, place.file))[0]
-    tidy = _tidied(text, cleaned, place)
-    if tidy is not None:
-        hint = said(text, place, tidy)
+    repair = _without_lookalikes(text, cleaned, place)
+    if repair is not None:
+        hint = hint_for(text, place, repair)
         yield from () if hint is None else (hint,)
         return
-    chunk = _statement(cleaned, place)
-    if chunk is None or len(chunk.raw) > LONGEST_STATEMENT:
+    statement = _statement(cleaned, place)
+    if statement is None or len(statement.raw) > LONGEST_STATEMENT:
         return
-    begin = _offset(text, chunk.line, chunk.column)
-    for repair in least_cost_repairs(chunk.raw, 0, speller(cleaned), may_go_on):
-        hint = said(text, place, Repair(repair.begin + begin, repair.end + begin, repair.new))
+    begin = _offset(text, statement.line, statement.column)
+    for repair in least_cost_repairs(statement.raw, 0, task_edit_costs(cleaned), may_go_on):
+        hint = hint_for(text, place, Repair(repair.begin + begin, repair.end + begin, repair.new))
         if hint is not None:
             yield hint
 
 
-def _tidied(text: str, cleaned: str, place: SourceLocation) -> Repair | None:
+def _without_lookalikes(text: str, cleaned: str, place: SourceLocation) -> Repair | None:
     """The line of a fault with look-alike characters replaced."""
     begin = _offset(text, place.line, 1)
     code = place.text.split("#")[0].rstrip()
-    odd = [n for n, char in enumerate(code) if char != cleaned[begin + n]]
-    if not odd:
+    replaced = [n for n, char in enumerate(code) if char != cleaned[begin + n]]
+    if not replaced:
         return None
-    start = code.rfind(" ", 0, odd[0]) + 1
-    end = code.find(" ", odd[-1])
+    start = code.rfind(" ", 0, replaced[0]) + 1
+    end = code.find(" ", replaced[-1])
     end = len(code) if end < 0 else end
     meant = re.sub(r"\s+", " ", cleaned[begin + start : begin + end])
     meant = re.sub(r"(?<=[(<]) | (?=[,)>])", "", meant).strip()
@@ -340,31 +351,31 @@ def _offset(text: str, line: int, column: int) -> int:
     return sum(len(row) + 1 for row in text.split("\n")[: line - 1]) + column - 1
 
 
-def said(text: str, place: SourceLocation, repair: Repair) -> str | None:
+def hint_for(text: str, place: SourceLocation, repair: Repair) -> str | None:
     """A change as a hint; with surrounding words if it would be ambiguous."""
     wanted = repair.applied(text).split()
-    for _ in range(WIDENED):
+    for _ in range(MOST_WIDENINGS):
         old, new = " ".join(text[repair.begin : repair.end].split()), repair.new.strip()
         hint = f"write `{new}` in place of `{old}`" if new else f"leave `{old}` out"
         fix = fix_of(text, place, hint) if old and "`" not in old + new else None
         if fix is not None and fix.applied(text).split() == wanted:
             return hint
-        wider = _wider(text, repair)
-        if wider is None or len(old) > MOST_SAID:
+        wider = _widened(text, repair)
+        if wider is None or len(old) > LONGEST_QUOTE:
             return None
         repair = wider
     return None
 
 
-def _wider(text: str, repair: Repair) -> Repair | None:
+def _widened(text: str, repair: Repair) -> Repair | None:
     """The same change with the preceding word, or at the beginning of a line with the following one."""
     line = text.rfind("\n", 0, repair.begin) + 1
     before = list(TOKEN.finditer(text, line, repair.begin))
     if before:
         start = before[-1].start()
-        kept = text[start : repair.begin]
-        kept = kept if repair.new.strip() and repair.new[0] in ",)]:" else f"{kept.rstrip()} "
-        return Repair(start, repair.end, kept + repair.new.lstrip())
+        word = text[start : repair.begin]
+        word = word if repair.new.strip() and repair.new[0] in ",)]:" else f"{word.rstrip()} "
+        return Repair(start, repair.end, word + repair.new.lstrip())
     behind = TOKEN.search(text, repair.end)
     if behind is None or "\n" in text[repair.end : behind.start()] or "#" in behind[0]:
         return None

@@ -11,7 +11,7 @@ from visup.agent.model.did_you_mean import closest
 from visup.agent.model.errors import TaskError
 from visup.agent.storage.text_file import read_text_file
 
-ROOT = "VISUP_TASK_ROOT"
+ROOT_VARIABLE = "VISUP_TASK_ROOT"
 """Environment variable: the folder in which all included files must lie."""
 
 
@@ -21,7 +21,7 @@ def include_root(file: str) -> Path:
     Args:
         file: The including task file.
     """
-    given = os.environ.get(ROOT)
+    given = os.environ.get(ROOT_VARIABLE)
     return Path(given) if given else Path(file).parent
 
 
@@ -38,13 +38,13 @@ def read_text(path_or_name: str | Path) -> str:
     try:
         return read_text_file(path)
     except FileNotFoundError:
-        raise _no_such(str(path_or_name)) from None
+        raise _not_found(str(path_or_name)) from None
     except UnicodeDecodeError as e:
         what = f"it is not text: byte {e.start} is not UTF-8"
         raise TaskError(what, where=str(path), expected="a task file in UTF-8") from e
     except (OSError, ValueError) as e:
-        said = getattr(e, "strerror", None) or e
-        what = f"cannot be read: {said}"
+        reason = getattr(e, "strerror", None) or e
+        what = f"cannot be read: {reason}"
         raise TaskError(what, where=str(path), expected="a task file") from e
 
 
@@ -59,19 +59,19 @@ def read_beside(path: str, including: str, root: Path | None = None) -> tuple[st
     Raises:
         TaskError: There is no such file or task, it is not text, or it is outside the folder.
     """
-    beside = Path(
+    candidate = Path(
         normpath(Path(including).parent / path)
     )  # normalised, so that a file has one name
-    if path in shipped_tasks() and not beside.exists():
+    if path in shipped_tasks() and not candidate.exists():
         return path, read_text(path)
-    if root is not None and not _is_within(beside, root):
+    if root is not None and not _is_within(candidate, root):
         raise TaskError(
             "it is outside the folder of the task being read",
-            where=str(beside)[:LONGEST_NAME],
+            where=str(candidate)[:LONGEST_NAME],
             expected=f"a file in {root} or below",
-            hint=f"{ROOT} may name a folder above both",
+            hint=f"{ROOT_VARIABLE} may name a folder above both",
         )
-    return str(beside), read_text(beside)
+    return str(candidate), read_text(candidate)
 
 
 LONGEST_NAME = 200
@@ -96,7 +96,7 @@ def textmate_grammar() -> str:
     return files("visup.tasks.tools").joinpath("tasks.tmLanguage.json").read_text(encoding="utf-8")
 
 
-def _no_such(name: str) -> TaskError:
+def _not_found(name: str) -> TaskError:
     shipped = shipped_tasks()
     beside = Path(name).parent
     known = (

@@ -76,7 +76,7 @@ def load_tasks(
         TaskError: When there is no such file or task, or it has one mistake.
         ErrorGroup: When it has several.
     """
-    path, wanted = _parted(path_or_name)
+    path, wanted = _split_task_name(path_or_name)
     tasks = tasks_of(parse_task(read_text(path), path, actions))
     chosen = tuple(t for t in tasks if not wanted or t.name == wanted)
     if not chosen:
@@ -85,7 +85,7 @@ def load_tasks(
     return chosen
 
 
-def _parted(path_or_name: str | Path) -> tuple[str, str]:
+def _split_task_name(path_or_name: str | Path) -> tuple[str, str]:
     """The path, and the name of the task behind the last colon, or empty."""
     path, colon, name = str(path_or_name).rpartition(":")
     if colon and name.isidentifier() and not Path(path_or_name).exists():

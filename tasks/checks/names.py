@@ -46,7 +46,7 @@ from visup.tasks.grammar.structure import spare_kinds, task_actors
 from visup.tasks.grammar.units import LENGTH, SIZE, TIME, UNITS, dimension, units_of, value
 
 Declared = Actor | ZoneDeclaration | Parameter
-Asked = tuple[str, tuple[Name, ...], Span]
+ActionUse = tuple[str, tuple[Name, ...], Span]
 """An action of a file, its actors, and its position."""
 
 
@@ -59,14 +59,14 @@ class NameCheck:
         source: For positions.
         actions: The available actions.
         percepts: The available kinds of percept.
-        asked: Every action of the file.
+        uses: Every action of the file.
     """
 
     parsed: ParsedFile
     source: Source
     actions: Mapping[str, ActionDefinition]
     percepts: AnySet[str]
-    asked: list[Asked]
+    uses: list[ActionUse]
 
     @cached_property
     def task(self) -> Task:
@@ -95,16 +95,16 @@ class NameCheck:
     def faults(self) -> Iterator[Diagnostic]:
         """All faults of names and amounts."""
         yield from self.amounts()
-        yield from self.compared()
+        yield from self.comparison_faults()
         yield from self.ranges()
         yield from self.grounds()
         yield from self.kinds()
-        yield from self.declared()
+        yield from self.duplicate_declarations()
         yield from self.unused()
         yield from self.unobserved()
-        yield from self.astray()
+        yield from self.outside_loop()
 
-    def used(self) -> Iterator[tuple[Amount, str]]:
+    def used_amounts(self) -> Iterator[tuple[Amount, str]]:
         """Every used amount with its expected dimension; empty if unknown."""
         for course in self.courses:
             if isinstance(course, Timed):
@@ -122,7 +122,7 @@ class NameCheck:
             for amount in bounds_of(comparison):
                 on_floor = action_of(comparison).name == "gap" and self.measured(amount) == SIZE
                 of_signal = wanted != TIME and action_of(comparison).name in SIGNAL_WORDS
-                yield amount, SIZE if on_floor else ANY if of_signal else wanted
+                yield amount, SIZE if on_floor else ANY_DIMENSION if of_signal else wanted
 
     def measured(self, amount: Amount) -> str:
         """The dimension of an amount, or of its parameter."""
@@ -138,23 +138,27 @@ class NameCheck:
             else:
                 yield from self.amount(parameter.amount, "")
         known = {p.name: p.amount for p in self.task.parameters}
-        for amount, wanted in self.used():
+        for amount, wanted in self.used_amounts():
             if isinstance(amount, Number):
                 yield from self.amount(amount, wanted)
             elif amount.name not in known:
                 if not self.parsed.lacking and amount.name not in self.parsed.defined:
-                    hint = did_you_mean(amount.name, known, "`{}`") if len(known) < MANY else None
+                    hint = (
+                        did_you_mean(amount.name, known, "`{}`")
+                        if len(known) < MOST_COMPARED
+                        else None
+                    )
                     what = f"parameter `{amount}` is not declared"
                     expected = f"`parameter {amount} is 90 s`"
                     yield self.source.fault("E223", what, amount.span, expected, hint)
             else:
-                yield from self.of_kind(self.task.amount(amount), wanted, amount)
+                yield from self.dimension_faults(self.task.amount(amount), wanted, amount)
 
     def amount(self, amount: Number, wanted: str) -> Iterator[Diagnostic]:
         """Faults of one amount that is not a parameter."""
-        if wanted == ANY and amount.unit == Unit.NONE:
+        if wanted == ANY_DIMENSION and amount.unit == Unit.NONE:
             return
-        if wanted == ANY:
+        if wanted == ANY_DIMENSION:
             what = f"the numbers of signals have no unit, unlike `{amount}`"
             if amount.unit == Unit.PERCENT:
                 what = f"the numbers of signals have no unit, and `{amount}` is {value(amount):g}"
@@ -178,22 +182,23 @@ class NameCheck:
         elif amount.value <= 0 and wanted == SIZE:
             yield self.source.fault("E217", f"`{amount}` is not a positive size", amount.span)
         else:
-            yield from self.of_kind(amount, wanted, amount)
+            yield from self.dimension_faults(amount, wanted, amount)
 
-    def of_kind(self, amount: Number, wanted: str, used: Amount) -> Iterator[Diagnostic]:
+    def dimension_faults(self, amount: Number, wanted: str, used: Amount) -> Iterator[Diagnostic]:
         """A fault if an amount has a wrong dimension for its use."""
         measured = dimension(amount)
         if wanted in _MEASURED and measured and measured != wanted:
-            what = f"`{used}` is not {_a(WORDS.get(wanted, wanted))}"
+            noun = _with_article(DIMENSION_WORDS.get(wanted, wanted))
+            what = f"`{used}` is not {noun}"
             if isinstance(used, ParameterRef):
-                what = f"parameter `{used}` is `{amount}`, which is not {_a(WORDS.get(wanted, wanted))}"
+                what = f"parameter `{used}` is `{amount}`, which is not {noun}"
             hint = "did you mean `min`?" if (wanted, amount.unit) == (TIME, "m") else None
             yield self.source.fault("E226", what, used.span, units_of(wanted), hint)
 
-    def compared(self) -> Iterator[Diagnostic]:
+    def comparison_faults(self) -> Iterator[Diagnostic]:
         """Quantities without comparison, comparisons without quantity."""
         compared = {id(action_of(c).span) for c in self.comparisons if not is_periodic(c)}
-        for name, _, span in self.asked:
+        for name, _, span in self.uses:
             meaning = self.actions.get(name)
             if meaning is None:
                 continue
@@ -218,19 +223,23 @@ class NameCheck:
     def kinds(self) -> Iterator[Diagnostic]:
         """Zones in place of actors, and vice versa."""
         zones = {z.name for z in self.task.zones}
-        for name, actors, _ in self.asked:
+        for name, actors, _ in self.uses:
             meaning = self.actions.get(name)
             if meaning is None or len(actors) != meaning.arity:
                 continue
             for actor, kind in zip(actors, meaning.kinds, strict=True):
-                said = str(actor)
-                known = said in zones or said in self.parsed.defined or self.parsed.lacking
+                actor_name = str(actor)
+                known = (
+                    actor_name in zones or actor_name in self.parsed.defined or self.parsed.lacking
+                )
                 if kind == "zone" and not known:
-                    what = f"`{name}` takes a zone, but `{said}` is not one"
-                    hint = did_you_mean(said, zones, "`{}`")
-                    yield self.source.fault("E229", what, actor.span, f"`zone {said} is ...`", hint)
-                elif kind == "object" and said in zones:
-                    what = f"`{said}` is a zone, but `{name}` takes an actor here"
+                    what = f"`{name}` takes a zone, but `{actor_name}` is not one"
+                    hint = did_you_mean(actor_name, zones, "`{}`")
+                    yield self.source.fault(
+                        "E229", what, actor.span, f"`zone {actor_name} is ...`", hint
+                    )
+                elif kind == "object" and actor_name in zones:
+                    what = f"`{actor_name}` is a zone, but `{name}` takes an actor here"
                     yield self.source.fault("E229", what, actor.span, "an actor")
 
     def grounds(self) -> Iterator[Diagnostic]:
@@ -238,7 +247,7 @@ class NameCheck:
         floors = [*(z.floor for z in self.task.zones), *(g.floor for g in self.task.grounds)]
         for side in (side for floor in floors for point in floor for side in point):
             known = side.unit in UNITS  # a position may be 0 m
-            yield from self.of_kind(side, SIZE, side) if known else self.amount(side, SIZE)
+            yield from self.dimension_faults(side, SIZE, side) if known else self.amount(side, SIZE)
         for ground in self.task.grounds[1:]:
             hint = "several tasks of one file share it"
             yield self.source.fault("E224", "`ground` is declared twice", ground.span, hint=hint)
@@ -248,7 +257,7 @@ class NameCheck:
                 expected = "four points, such as the corners of a rectangle on the floor"
                 yield self.source.fault("E136", what, ground.span, expected)
 
-    def declared(self) -> Iterator[Diagnostic]:
+    def duplicate_declarations(self) -> Iterator[Diagnostic]:
         """Names declared twice; actors are checked elsewhere."""
         first: dict[str, str] = {a.name: "an actor" for a in self.task.actors}
         bystanders = [b for b in self.task.bystanders if b.name]
@@ -273,8 +282,8 @@ class NameCheck:
         """Unused zones and parameters, except those of included files."""
         if self.parsed.faults:
             return
-        named = {str(a) for _, actors, _ in self.asked for a in actors}
-        named |= {a.name for a, _ in self.used() if isinstance(a, ParameterRef)}
+        named = {str(a) for _, actors, _ in self.uses for a in actors}
+        named |= {a.name for a, _ in self.used_amounts() if isinstance(a, ParameterRef)}
         for kind, declared in (("zone", self.task.zones), ("parameter", self.task.parameters)):
             for one in declared:
                 if one.name not in named and not one.span.file:
@@ -284,38 +293,38 @@ class NameCheck:
     def unobserved(self) -> Iterator[Diagnostic]:
         """Actions whose percepts are not available, each reported once."""
         reported = set()
-        for name, _, span in self.asked:
+        for name, _, span in self.uses:
             meaning = self.actions.get(name)
             missing = sorted(meaning.needs - self.percepts) if meaning else []
             if missing and name not in reported:
                 reported.add(name)
-                said = " and ".join(f"`{m}`" for m in missing)
-                what = f"`{name}` can never be observed: it needs {said}, which nothing provides"
+                missing_kinds = " and ".join(f"`{m}`" for m in missing)
+                what = f"`{name}` can never be observed: it needs {missing_kinds}, which nothing provides"
                 hint = "enable the behaviour that provides it, or require something else"
                 yield self.source.fault("E231", what, span, hint=hint)
 
-    def astray(self) -> Iterator[Diagnostic]:
+    def outside_loop(self) -> Iterator[Diagnostic]:
         """New actors of a loop used outside of it."""
         for kind in spare_kinds(self.task):
-            outside = ((n, actors, a) for n, actors, _ in self.asked for a in actors if a == kind)
+            outside = ((n, actors, a) for n, actors, _ in self.uses for a in actors if a == kind)
             for name, actors, actor in islice(outside, 1):
                 what = f"`{kind}`, another one in each round of `for each new {kind}`, stands outside of it"
-                said = f"{name}({', '.join(map(str, actors))})"
-                hint = f"write `for each new {kind} {said}` in place of `{said}`"
+                call = f"{name}({', '.join(map(str, actors))})"
+                hint = f"write `for each new {kind} {call}` in place of `{call}`"
                 expected = "an actor that stays the same, or another such loop"
                 yield self.source.fault("E240", what, actor.span, expected, hint)
 
 
-ANY = "any"
-MANY = 500  # limit for pairwise comparison of names
-WORDS = {
+ANY_DIMENSION = "any"
+MOST_COMPARED = 500  # limit for pairwise comparison of names
+DIMENSION_WORDS = {
     "angular_speed": "speed of turning",
     "size": "real size",
 }
 _MEASURED = frozenset(d for d, _ in UNITS.values())
 
 
-def _a(noun: str) -> str:
+def _with_article(noun: str) -> str:
     return f"{'an' if noun[0] in 'aeiou' else 'a'} {noun}"
 
 

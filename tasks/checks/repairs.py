@@ -18,8 +18,8 @@ from visup.rules.correction.meaning_loss import COMMON_FIX_BONUS, SMALL_LOSS, me
 from visup.rules.language.diagnostics import Diagnostic
 from visup.rules.language.fixes import fix_of
 from visup.tasks.actions.actions import ACTIONS
-from visup.tasks.checks.additions import added, by_names
-from visup.tasks.checks.edit_costs import corrected, said
+from visup.tasks.checks.additions import definition_hints, name_hints
+from visup.tasks.checks.edit_costs import correction_hints, hint_for
 from visup.tasks.checks.foreign_forms import FOREIGN_FORMS
 from visup.tasks.checks.usual_meanings import USUAL, recoveries
 from visup.tasks.diagnostics.recovery import KEYWORDS
@@ -45,12 +45,12 @@ PHRASES = ("at least", "at most", "any order", "for each", "on failure of", "end
            "begins when", "pauses when", "progresses when", "each of", "each new")  # fmt: skip
 MEANT_WORDS = (*KEYWORDS, *PHRASES, "during", "leftmost", "rightmost", "largest", "smallest", "highest",
                "lowest", "left", "right", "top", "bottom")  # fmt: skip
-OTHER_WORDS = {"biggest": "largest", "tallest": "largest", "longest": "largest", "tiniest": "smallest",
+SYNONYMS = {"biggest": "largest", "tallest": "largest", "longest": "largest", "tiniest": "smallest",
                "topmost": "highest", "uppermost": "highest", "bottommost": "lowest"}  # fmt: skip
 """Synonyms of words of the language."""
 
 
-def with_tried_hints(
+def with_tested_hints(
     text: str, faults: Sequence[Diagnostic], check: Check
 ) -> tuple[Diagnostic, ...]:
     """The faults, with a tested change as their hint if one is found.
@@ -60,15 +60,15 @@ def with_tried_hints(
         faults: Its faults.
         check: Returns the faults of a text.
     """
-    trial, found = _HintTrial(text, faults, check), []
+    tester, found = _HintTester(text, faults, check), []
     for number, fault in enumerate(faults):
         hint = None
-        if number < MOST_HINTS and trial.left > 0 and not trial.helps(fault):
-            hint = trial.mend(fault)
-        said = (
+        if number < MOST_HINTS and tester.budget > 0 and not tester.help_of(fault):
+            hint = tester.best_hint(fault)
+        own_hint = (
             None if fix_of(text, fault.place, fault.hint) else fault.hint
         )  # drop hints that do not help
-        found.append(fault if hint is None else replace(fault, hint=_joined(said, hint)))
+        found.append(fault if hint is None else replace(fault, hint=_joined_hints(own_hint, hint)))
     return tuple(found)
 
 
@@ -76,165 +76,175 @@ FAULT_COST = 100
 """Least cost of explaining a fault, in checked characters."""
 LONGEST_HINT = 400
 """Maximum characters of a hint; longer ones are not read."""
-NOTHING, ONE_STEP, IN_PART, WHOLLY = range(4)
-"""How much a change helps: not at all; it moves the next fault further on; it removes only syntax errors; or
-it removes a fault and causes no new one."""
+NO_HELP, NEXT_FAULT, PARTIAL, COMPLETE = range(4)
+"""How much a change helps: not at all; the next fault is further on; only syntax errors are removed; or a
+fault is removed and no new one appears."""
 
 
 @dataclass
-class _HintTrial:
+class _HintTester:
     """Tests changes of a text within a budget.
 
     Attributes:
         text: The file.
         faults: Its faults.
         check: Returns the faults of a text.
-        left: Remaining characters of the budget.
+        budget: Remaining characters of the budget.
     """
 
     text: str
     faults: Sequence[Diagnostic]
     check: Check
-    left: int = CHARACTERS_TRIED
+    budget: int = CHARACTERS_TRIED
 
-    def mend(self, fault: Diagnostic) -> str | None:
+    def best_hint(self, fault: Diagnostic) -> str | None:
         """A hint that helps: usual meanings before small edits, partial help before none."""
         found: list[tuple[str | None, int]] = []
-        granted = COMMON_FIX_BONUS
-        for hints in (_hints(self.text, fault), self.corrected(fault), self.edited(fault)):
-            keep = fault.code < "E2" and bool(found) and found[0][1] > ONE_STEP
+        bonus = COMMON_FIX_BONUS
+        for hints in (
+            _hints(self.text, fault),
+            self.correction_hints(fault),
+            self.edit_hints(fault),
+        ):
+            no_deletion = fault.code < "E2" and bool(found) and found[0][1] > NEXT_FAULT
             # A usual meaning that helps partly is preferred to deleting words.
-            hint, helps = self.best(
-                fault, (h for h in hints if not (keep and h.startswith("leave"))), granted
+            hint, helps = self.most_helpful(
+                fault, (h for h in hints if not (no_deletion and h.startswith("leave"))), bonus
             )
-            if helps == WHOLLY and self.lost(fault, hint) - granted <= SMALL_LOSS:
+            if helps == COMPLETE and self.meaning_loss(fault, hint) - bonus <= SMALL_LOSS:
                 return hint
             found.append((hint, helps))
-            granted = 0.0
+            bonus = 0.0
         usual, _, edit = found
-        whole = [hint for hint, helps in found if helps == WHOLLY]
-        if whole:
-            # What only leaves a definition unused may lose less than what removes the fault wholly.
-            apart = [usual[0]] if fault.code >= "E2" and usual[1] == IN_PART else []
+        complete = [hint for hint, helps in found if helps == COMPLETE]
+        if complete:
+            # A change that leaves a definition unused may lose less meaning than a complete fix.
+            apart = [usual[0]] if fault.code >= "E2" and usual[1] == PARTIAL else []
             return min(
-                (*whole, *apart),
+                (*complete, *apart),
                 key=lambda hint: (
-                    self.lost(fault, hint) - (COMMON_FIX_BONUS if hint == usual[0] else 0.0)
+                    self.meaning_loss(fault, hint) - (COMMON_FIX_BONUS if hint == usual[0] else 0.0)
                 ),
             )
-        return edit[0] if usual[1] <= ONE_STEP < edit[1] else usual[0]
+        return edit[0] if usual[1] <= NEXT_FAULT < edit[1] else usual[0]
 
-    def edited(self, fault: Diagnostic) -> Iterator[str]:
+    def edit_hints(self, fault: Diagnostic) -> Iterator[str]:
         """Small edits; for syntax errors first, since other faults may follow from them."""
         if fault.code < "E2" or all(f.code >= "E2" for f in self.faults):
             yield from _edits(fault)
 
-    def corrected(self, fault: Diagnostic) -> Iterator[str]:
+    def correction_hints(self, fault: Diagnostic) -> Iterator[str]:
         """Corrections of several words of a statement with a syntax error."""
         readings = MOST_READINGS
 
         def may_go_on() -> bool:
             nonlocal readings
             readings -= 1
-            self.left -= READING_COST
-            return readings > 0 and self.left > 0
+            self.budget -= READING_COST
+            return readings > 0 and self.budget > 0
 
         if fault.code < "E2":
-            yield from islice(corrected(self.text, fault.place, may_go_on), MOST_CORRECTIONS)
+            yield from islice(correction_hints(self.text, fault.place, may_go_on), MOST_CORRECTIONS)
 
-    def best(
-        self, fault: Diagnostic, hints: Iterable[str], granted: float
+    def most_helpful(
+        self, fault: Diagnostic, hints: Iterable[str], bonus: float
     ) -> tuple[str | None, int]:
-        """The hint that helps most, and how much; of those that help wholly the first to lose little."""
-        partly: str | None = None
-        most = NOTHING
-        whole: list[tuple[float, str]] = []
+        """The hint that helps most, and how much; of complete fixes the first that loses little meaning."""
+        partial: str | None = None
+        most = NO_HELP
+        complete: list[tuple[float, str]] = []
         for hint in hints:
             if len(hint) > LONGEST_HINT or "..." in hint:
                 continue
-            self.left -= len(self.text) + FAULT_COST * len(self.faults)
-            if self.left < 0:
+            self.budget -= len(self.text) + FAULT_COST * len(self.faults)
+            if self.budget < 0:
                 break
-            helps = self.helps(replace(fault, hint=hint))
-            if helps == WHOLLY:
-                whole.append((self.lost(fault, hint) - granted, hint))
-                if whole[-1][0] <= SMALL_LOSS or len(whole) == MOST_COMPARED:
+            helps = self.help_of(replace(fault, hint=hint))
+            if helps == COMPLETE:
+                complete.append((self.meaning_loss(fault, hint) - bonus, hint))
+                if complete[-1][0] <= SMALL_LOSS or len(complete) == MOST_COMPARED:
                     break
             elif helps > most:
-                partly, most = hint, helps
-        if whole:
-            return min(whole, key=lambda found: found[0])[1], WHOLLY
-        return partly, most
+                partial, most = hint, helps
+        if complete:
+            return min(complete, key=lambda found: found[0])[1], COMPLETE
+        return partial, most
 
-    def lost(self, fault: Diagnostic, hint: str | None) -> float:
-        """What the change of a hint loses of the file."""
+    def meaning_loss(self, fault: Diagnostic, hint: str | None) -> float:
+        """How much of the meaning of the file the change of a hint loses."""
         fix = fix_of(self.text, fault.place, hint)
         return inf if fix is None else meaning_lost(self.text, fix.applied(self.text))
 
-    def helps(self, fault: Diagnostic) -> int:
+    def help_of(self, fault: Diagnostic) -> int:
         """How much the change of a hint helps."""
         fix = fix_of(self.text, fault.place, fault.hint)
         if fix is None:
-            return NOTHING
+            return NO_HELP
         after = self.check(fix.applied(self.text))
-        known = told(self.faults)
+        known = messages(self.faults)
         if len(after) < len(self.faults) and all((f.code, f.message) in known for f in after):
-            return WHOLLY
+            return COMPLETE
         # Removing a syntax error may reveal hidden faults.
-        unread = [sum(f.code < "E2" for f in found) for found in (after, self.faults)]
+        syntax_errors = [sum(f.code < "E2" for f in found) for found in (after, self.faults)]
         if fault.code >= "E2":
-            return self.left_over(fault, after)
-        if unread[0] < unread[1]:
-            return IN_PART
+            return self.help_leaving_unused(fault, after)
+        if syntax_errors[0] < syntax_errors[1]:
+            return PARTIAL
         new = [f for f in after if (f.code, f.message) not in known]
-        further = all(_at(f) > _at(fault) for f in new) and len(after) <= len(self.faults)
-        return ONE_STEP if further and (fault.code, fault.message) not in told(after) else NOTHING
+        further = all(_position(f) > _position(fault) for f in new) and len(after) <= len(
+            self.faults
+        )
+        return (
+            NEXT_FAULT
+            if further and (fault.code, fault.message) not in messages(after)
+            else NO_HELP
+        )
 
-    def left_over(self, fault: Diagnostic, after: Sequence[Diagnostic]) -> int:
-        """How much a change helps that only leaves an unused definition behind."""
-        known = told(self.faults)
+    def help_leaving_unused(self, fault: Diagnostic, after: Sequence[Diagnostic]) -> int:
+        """How much a change helps that may leave an unused definition."""
+        known = messages(self.faults)
         new = {f.code for f in after if (f.code, f.message) not in known}
-        gone = (fault.code, fault.message) not in told(after)
-        return IN_PART if gone and new <= set(UNUSED) else NOTHING
+        gone = (fault.code, fault.message) not in messages(after)
+        return PARTIAL if gone and new <= set(UNUSED) else NO_HELP
 
 
 UNUSED = ("E204", "E213", "E225")
 """Codes of unused definitions, which can always be deleted."""
 
 
-def told(faults: Sequence[Diagnostic]) -> set[tuple[str, str]]:
+def messages(faults: Sequence[Diagnostic]) -> set[tuple[str, str]]:
     """The messages of faults, regardless of position."""
     return {(f.code, f.message) for f in faults}
 
 
-def _at(fault: Diagnostic) -> tuple[int, int]:
+def _position(fault: Diagnostic) -> tuple[int, int]:
     return fault.place.line, fault.place.column
 
 
-def _joined(said: str | None, hint: str) -> str:
-    return hint if said is None else f"{said}; {hint}"
+def _joined_hints(own_hint: str | None, tested: str) -> str:
+    return tested if own_hint is None else f"{own_hint}; {tested}"
 
 
 def _hints(text: str, fault: Diagnostic) -> Iterator[str]:
     line = fault.place.text
     if fault.code < "E2":
         for match, new in recoveries(text, line):
-            yield _placed(text, fault, match, new)
+            yield _unambiguous_hint(text, fault, match, new)
         yield from _misspelt(line, fault.place.column - 1)
-    yield from by_names(text, fault)
+    yield from name_hints(text, fault)
     for usual in (*FOREIGN_FORMS, *USUAL):
         if fault.code not in usual.codes:
             continue
-        matches = list(usual.found(line))
+        matches = list(usual.matches(line))
         for match in sorted(matches, key=lambda m: _distance(m, fault.place.column - 1)):
             new = match.expand(usual.new) if isinstance(usual.new, str) else usual.new(match)
             if new != match[0]:
-                yield _placed(text, fault, match, new)
+                yield _unambiguous_hint(text, fault, match, new)
     yield from _as_expected(fault)
-    yield from added(text, fault)
+    yield from definition_hints(text, fault)
 
 
-def _placed(text: str, fault: Diagnostic, match: re.Match[str], new: str) -> str:
+def _unambiguous_hint(text: str, fault: Diagnostic, match: re.Match[str], new: str) -> str:
     """A change as a hint; with surrounding words if it would be ambiguous."""
     line = fault.place.text
     plain = _hint(line, match, new, fault.place.column - 1)
@@ -247,18 +257,21 @@ def _placed(text: str, fault: Diagnostic, match: re.Match[str], new: str) -> str
         and match.start() <= fix.column - 1 + fix.length
     ):
         return plain
-    return said(text, fault.place, Repair(begin + match.start(), begin + match.end(), new)) or plain
+    return (
+        hint_for(text, fault.place, Repair(begin + match.start(), begin + match.end(), new))
+        or plain
+    )
 
 
 def _misspelt(line: str, at: int) -> Iterator[str]:
     """Replacements of misspelt words of the language, nearest to the caret first."""
     for pair in re.finditer(r"(?=\b([a-z]+)\s+([a-z]+)\b)", line):
-        turned = f"{pair[2]} {pair[1]}"
-        for meant in close_matches(turned, PHRASES, n=1, cutoff=ALIKE):
+        swapped = f"{pair[2]} {pair[1]}"
+        for meant in close_matches(swapped, PHRASES, n=1, cutoff=ALIKE):
             yield f"write `{meant}` in place of `{pair[1]} {pair[2]}`"
     for match in sorted(LONE_WORD.finditer(line), key=lambda m: _distance(m, at)):
-        if match[0] in OTHER_WORDS:
-            yield _hint(line, match, OTHER_WORDS[match[0]], at)
+        if match[0] in SYNONYMS:
+            yield _hint(line, match, SYNONYMS[match[0]], at)
         elif match[0] not in MEANT_WORDS:
             for meant in close_matches(match[0].lower(), MEANT_WORDS, n=3, cutoff=ALIKE):
                 yield _hint(line, match, meant, at)
@@ -267,24 +280,24 @@ def _misspelt(line: str, at: int) -> Iterator[str]:
 def _as_expected(fault: Diagnostic) -> Iterator[str]:
     """The expected text, if it is the same in other characters or another unit."""
     at = fault.place.column - 1
-    said = fault.place.text[at : at + fault.place.length].strip()
-    shown = re.findall(r"`([^`]+)`", fault.expected or "")
-    if len(shown) != 1 or not said:
+    quoted = fault.place.text[at : at + fault.place.length].strip()
+    examples = re.findall(r"`([^`]+)`", fault.expected or "")
+    if len(examples) != 1 or not quoted:
         return
-    if shown[0].startswith("<") and said.isidentifier():
-        yield f"write `<{said}>` in place of `{said}`"
-    amount = re.match(r"-?[\d.]+(?=\s*\S)", said)
-    if amount and shown[0] in UNITS:
-        yield f"write `{amount[0]} {shown[0]}` in place of `{said}`"
-    elif set(re.findall(r"\w+", shown[0])) == set(re.findall(r"\w+", said)):
-        yield f"write `{shown[0]}` in place of `{said}`"
+    if examples[0].startswith("<") and quoted.isidentifier():
+        yield f"write `<{quoted}>` in place of `{quoted}`"
+    amount = re.match(r"-?[\d.]+(?=\s*\S)", quoted)
+    if amount and examples[0] in UNITS:
+        yield f"write `{amount[0]} {examples[0]}` in place of `{quoted}`"
+    elif set(re.findall(r"\w+", examples[0])) == set(re.findall(r"\w+", quoted)):
+        yield f"write `{examples[0]}` in place of `{quoted}`"
 
 
 def _edits(fault: Diagnostic) -> Iterator[str]:
     """Small edits next to the fault, if there is no usual meaning."""
     place = fault.place
-    unread = fault.code < "E2"
-    for repair in edits(place.text, place.column - 1, place.length, WORDS, unread=unread):
+    has_syntax_error = fault.code < "E2"
+    for repair in edits(place.text, place.column - 1, place.length, WORDS, unread=has_syntax_error):
         hint = hint_of(place.text, repair)
         if hint is not None and not hint.startswith("leave `::="):  # two stages would be made one
             yield hint
@@ -300,7 +313,7 @@ def _distance(match: re.Match[str], at: int) -> int:
 
 
 def _hint(line: str, match: re.Match[str], new: str, at: int) -> str:
-    """A change as a hint that `fix_of` parses, at the caret or with a named position."""
+    """A change as a hint that `fix_of` parses."""
     old = match[0]
     if not old.strip():
         before = re.search(r"\S+\s*$", line[: match.start()])

@@ -19,7 +19,7 @@ from visup.tasks.actions.actions import ACTIONS, ActionDefinition
 from visup.tasks.checks.ambiguity import AmbiguityCheck
 from visup.tasks.checks.bounds import BoundsCheck
 from visup.tasks.checks.courses import CourseCheck
-from visup.tasks.checks.criteria import TakingPart, criteria_faults
+from visup.tasks.checks.criteria import ActorUseCheck, criteria_faults
 from visup.tasks.checks.names import NameCheck
 from visup.tasks.diagnostics.recovery import ParsedFile
 from visup.tasks.grammar.analysis import Grammar
@@ -79,20 +79,20 @@ class _Semantics:
         return [(s, c) for s, body in bodies for c in walk(body)]
 
     @cached_property
-    def asked(self) -> list[tuple[str, tuple[Name, ...], Span]]:
+    def uses(self) -> list[tuple[str, tuple[Name, ...], Span]]:
         """Every action of the file: (action, actors, span)."""
         task = self.parsed.task
         facts = [c for _, c in self.courses if isinstance(c, Action | Comparison)]
         signs = (s for _, c in self.courses if isinstance(c, Conditioned) for s in c.conditions)
         conditions = [s.condition for s in signs] + [i.condition for i in task.invariants]
         facts += [f for c in conditions for f in facts_of(c)]
-        asked = [(action_of(f).name, actors_of(f), action_of(f).span) for f in facts]
-        asked += [
+        uses = [(action_of(f).name, actors_of(f), action_of(f).span) for f in facts]
+        uses += [
             (s.name, s.body.names, s.span)
             for s in task.stages
-            if isinstance(s.body, Actors) and not self.misread(s)
+            if isinstance(s.body, Actors) and not self.intended_meaning(s)
         ]
-        return asked
+        return uses
 
     @cached_property
     def heads(self) -> set[int]:
@@ -100,24 +100,24 @@ class _Semantics:
         return {id(s.span) for s in self.parsed.task.stages}
 
     def faults(self) -> Iterator[Diagnostic]:
-        yield from self.plain_lists()
+        yield from self.unbracketed_lists()
         yield from self.reserved()
         yield from self.unknown_actions()
         yield from self.actors_of_actions()
         yield from self.references()
-        yield from self.twice()
+        yield from self.duplicates()
         if not self.parsed.faults:
             yield from self.unreachable()
-            took_part = TakingPart(self.parsed.task, self.source, self.asked, self.undefined)
-            yield from took_part.misspelt()
-            yield from took_part.idle()
+            actor_uses = ActorUseCheck(self.parsed.task, self.source, self.uses, self.undefined)
+            yield from actor_uses.misspelt_actors()
+            yield from actor_uses.unused_actors()
         whole = not (self.undefined or self.parsed.faults)
         yield from CourseCheck(
             self.parsed.task, self.source, self.actions, whole, self.grammar
         ).faults()
         yield from criteria_faults(self.parsed.task, self.source)
         yield from NameCheck(
-            self.parsed, self.source, self.actions, self.percepts, self.asked
+            self.parsed, self.source, self.actions, self.percepts, self.uses
         ).faults()
         if whole:
             bounds = list(BoundsCheck(self.grammar, self.source).faults())
@@ -125,7 +125,7 @@ class _Semantics:
         if whole and not bounds:
             yield from AmbiguityCheck(self.parsed.task, self.source, self.grammar).faults()
 
-    def misread(self, stage: Stage) -> str:
+    def intended_meaning(self, stage: Stage) -> str:
         """The intended meaning of a plain list of names that is no action, or empty."""
         if not isinstance(stage.body, Actors) or stage.name in self.actions:
             return ""
@@ -142,12 +142,12 @@ class _Semantics:
     def defined(self) -> set[str]:
         return {s.name for s in self.parsed.task.stages}
 
-    def plain_lists(self) -> Iterator[Diagnostic]:
+    def unbracketed_lists(self) -> Iterator[Diagnostic]:
         for stage in self.parsed.task.stages:
             if not isinstance(stage.body, Actors):
                 continue
             names = [str(n) for n in stage.body.names]
-            match self.misread(stage):
+            match self.intended_meaning(stage):
                 case "action":
                     meant = f"`{names[0]}({', '.join(names[1:]) or '...'})`"
                     what = f"the actors of `{names[0]}` are written without brackets"
@@ -163,7 +163,7 @@ class _Semantics:
 
     def reserved(self) -> Iterator[Diagnostic]:
         task = self.parsed.task
-        named = [a for _, actors, _ in self.asked for a in actors]
+        named = [a for _, actors, _ in self.uses for a in actors]
         named += [Name(a.name, a.span) for a in task.declared]
         for name in named:
             if str(name) in RESERVED_WORDS:
@@ -171,27 +171,27 @@ class _Semantics:
                 yield self.source.fault("E123", what, name.span, "another name")
 
     def unknown_actions(self) -> Iterator[Diagnostic]:
-        told = set()
-        for name, _, span in self.asked:
-            if name in self.actions or name in told:
+        reported = set()
+        for name, _, span in self.uses:
+            if name in self.actions or name in reported:
                 continue
-            told.add(name)
-            near = closest(name, self.actions, 0.8) or synonym(name, self.actions)
-            near = near or closest(name, self.actions)
-            shown = f"an action: {', '.join(sorted(ACTIONS))}, or a word of rules"
+            reported.add(name)
+            suggestion = closest(name, self.actions, 0.8) or synonym(name, self.actions)
+            suggestion = suggestion or closest(name, self.actions)
+            expected = f"an action: {', '.join(sorted(ACTIONS))}, or a word of rules"
             width = replace(span, end_line=span.line, end_column=span.column + len(name))
             at = span if self.is_head(span) else width
-            hint = f"did you mean `{near}`?" if near else None
+            hint = f"did you mean `{suggestion}`?" if suggestion else None
             what = f"unknown action `{name}`"
             if self.is_head(span):
                 what = f"`<{name}>` is given actors, but `{name}` is not an action"
-            yield self.source.fault("E201", what, at, shown, hint)
+            yield self.source.fault("E201", what, at, expected, hint)
 
     def is_head(self, span: Span) -> bool:
         return id(span) in self.heads
 
     def actors_of_actions(self) -> Iterator[Diagnostic]:
-        for name, actors, span in self.asked:
+        for name, actors, span in self.uses:
             meaning = self.actions.get(name)
             if meaning is None:
                 continue
@@ -220,7 +220,7 @@ class _Semantics:
 
     def references(self) -> Iterator[Diagnostic]:
         defined = [s.name for s in self.parsed.task.stages]
-        heads = self.headless()
+        heads = self.heads_without_sign()
         once = {(r.span.line, r.span.column): name for name, r in self.undefined.items()}
         for name in once.values():  # in a loop the same mistake is made for each actor
             reference = self.undefined[name]
@@ -235,7 +235,7 @@ class _Semantics:
             what = f"stage `<{name}>` is not defined"
             yield self.source.fault("E202", what, reference.span, expected, hint)
 
-    def headless(self) -> dict[str, Reference]:
+    def heads_without_sign(self) -> dict[str, Reference]:
         """Undefined stages at the beginning of a line, which may be rules without `::=`."""
         found: dict[str, Reference] = {}
         for _, c in self.courses:
@@ -246,7 +246,7 @@ class _Semantics:
                     found.setdefault(c.stage, c)
         return found
 
-    def twice(self) -> Iterator[Diagnostic]:
+    def duplicates(self) -> Iterator[Diagnostic]:
         first: dict[str, Span] = {}
         for stage in self.parsed.task.stages:
             if stage.name in first:
@@ -265,13 +265,13 @@ class _Semantics:
 
     def unreachable(self) -> Iterator[Diagnostic]:
         recovered = {r.stage for r in self.parsed.task.recovered}
-        if self.headless() or recovered & self.undefined.keys():
+        if self.heads_without_sign() or recovered & self.undefined.keys():
             return  # what follows such a failure is not reached either
         missing = {closest(u, self.grammar.stages) for u in self.undefined}
         misread = {
             str(n)
             for s in self.parsed.task.stages
-            if isinstance(s.body, Actors) and self.misread(s)
+            if isinstance(s.body, Actors) and self.intended_meaning(s)
             for n in s.body.names
         }
         roots = self.parsed.task.roots

@@ -12,10 +12,14 @@ from visup.rules.correction.everyday_phrases import NUMBERS
 from visup.rules.language.synonyms import synonym
 from visup.tasks.actions.actions import ACTIONS
 from visup.tasks.checks.edit_costs import plain_call
-from visup.tasks.diagnostics.course_error_patterns import JOINING, SIGNS_MEANT, is_in_condition
+from visup.tasks.diagnostics.course_error_patterns import (
+    CONDITION_SYNONYMS,
+    JOINING,
+    is_in_condition,
+)
 from visup.tasks.grammar.statement import NAME, PARAMETERS
 
-New = str | Callable[[re.Match[str]], str]
+Replacement = str | Callable[[re.Match[str]], str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,25 +34,25 @@ class UsualMeaning:
 
     codes: tuple[str, ...]
     pattern: str
-    new: New
+    new: Replacement
 
-    def found(self, line: str) -> Iterator[re.Match[str]]:
+    def matches(self, line: str) -> Iterator[re.Match[str]]:
         """Where the pattern is found in a line."""
         return _compiled(self.pattern).finditer(line)
 
 
 @cache
 def _compiled(pattern: str) -> re.Pattern[str]:
-    """Compiled when it is first needed: there are hundreds, and most processes read no mistake."""
+    """A compiled pattern; compiled on first use, since there are hundreds and most runs need none."""
     return re.compile(pattern)
 
 
-def usual(codes: str, pattern: str, new: New) -> UsualMeaning:
+def usual(codes: str, pattern: str, new: Replacement) -> UsualMeaning:
     """A usual meaning of mistakes with these codes, separated by blanks."""
     return UsualMeaning(tuple(codes.split()), pattern, new)
 
 
-STAGES_MEANT = {"near": "converging", "hold": "coupled", "holding": "coupled", "present": "present",
+STAGE_SYNONYMS = {"near": "converging", "hold": "coupled", "holding": "coupled", "present": "present",
                 "wait": "present", "come": "converging"}  # fmt: skip
 """Meanings of everyday words as stages, where they differ from those as conditions."""
 OPPOSITES = {"touching": "apart", "coupled": "decoupled", "present": "gone", "inside": "outside",
@@ -57,14 +61,14 @@ KEYWORD = (
     r"(?:for|within|after|at|least|most|times?|begins|ends|fails|progresses|pauses|when|any|order|already|each"
     r"|of)"
 )
-SIGN = r"begins|ends|fails|progresses|pauses"
-MEANT = "|".join(SIGNS_MEANT)
+CONDITION_KIND = r"begins|ends|fails|progresses|pauses"
+CONDITION_SYNONYM = "|".join(CONDITION_SYNONYMS)
 CALL = rf"{NAME}\s*\([^()]*\)"
 PAIR = rf"\(\s*{NAME}\s*,\s*{NAME}\s*\)"
-PARTS = rf"(?:{CALL}|<[^<>]*>)"
+ITEM = rf"(?:{CALL}|<[^<>]*>)"
 TIME = r"\d[\d.]*\s*(?:ms|s|min|h)"
 
-OFTEN = {"once": "1 time", "twice": "2 times", "thrice": "3 times"}
+COUNT_WORDS = {"once": "1 time", "twice": "2 times", "thrice": "3 times"}
 PREFIXES = ("already", "task", "never", "always")
 
 
@@ -73,15 +77,15 @@ def _listed(word: str, stages: str) -> str:
     return f"{word} ({', '.join(stages.split())})"
 
 
-def _sign_once(match: re.Match[str]) -> str:
-    """A doubled sign of logic: a word in a condition, else the sign once."""
-    sign = match[0][0]
-    return JOINING[sign] if is_in_condition(match.string, match.start()) else sign
+def _single_operator(match: re.Match[str]) -> str:
+    """A doubled operator (`&&`): a word in a condition, else the operator once."""
+    operator = match[0][0]
+    return JOINING[operator] if is_in_condition(match.string, match.start()) else operator
 
 
-def _action_meant(name: str) -> str:
+def _intended_action(name: str) -> str:
     """The action meant by an everyday word; else the name itself."""
-    return STAGES_MEANT.get(name) or synonym(name, ACTIONS) or name
+    return STAGE_SYNONYMS.get(name) or synonym(name, ACTIONS) or name
 
 
 USUAL = (
@@ -96,7 +100,7 @@ USUAL = (
     usual("E238", rf"\bevery\s+({TIME})\s+to\s+({TIME})", r"every \2 to \1"),
     usual("E238", r"between\s+([\d.]+\s*\S+)\s+and\s+([\d.]+\s*\S+)", r"between \2 and \1"),
     usual("E101 E103", rf"^\s*(?:do|must|should|shall|may|can)(?:\s*not|n't)\s+({NAME})(?=\s*\()",
-           lambda m: f"never {_action_meant(m[1])}"),
+           lambda m: f"never {_intended_action(m[1])}"),
     usual("E103", rf"\bnot\s+({NAME})(?=\s*\()", lambda m: OPPOSITES.get(m[1], m[1])),
     usual("E103 E127", rf"\b(?:historically|always|once|eventually|globally|finally|next)\s+(?={CALL})", ""),
     usual("E103", rf"\b({NAME})(?=\s+(?:{CALL}|<))", lambda m: closest(m[1], PREFIXES) or m[1]),
@@ -125,7 +129,7 @@ USUAL = (
     usual("E101 E115", rf"\b(for\s+each\s+{NAME})\s+(?:of|in)\s+({NAME}(?:\s*,\s*{NAME})+)\s+",
            r"\1 of (\2) "),
     usual("E101 E119", r"\bany\s+of\s*(?=\()", "any 1 of "),
-    usual("E119 E101", rf"\bany\s+(\d+)\s+of\s+({PARTS}(?:\s*,\s*{PARTS})+)", r"any \1 of (\2)"),
+    usual("E119 E101", rf"\bany\s+(\d+)\s+of\s+({ITEM}(?:\s*,\s*{ITEM})+)", r"any \1 of (\2)"),
     usual("E115 E101", rf"\bfor\s+each\s+({NAME})\s+(?={NAME}\()", r"for each new \1 "),
     usual("E115 E101", rf"\bfor\s+each\s+of\s+(?={NAME}\s+{NAME}\()", "for each of 2 "),
     usual("E102", r":\s*=", "::="),
@@ -138,8 +142,8 @@ USUAL = (
     usual("E101 E103 E119",
            rf"\bbetween\s+([\d.]+\s*[a-z%/]*)\s*(?:to|-|and|,|\.\.)\s*([\d.]+\s*[a-z%/]+)\s+({CALL})",
            r"\3 between \1 and \2"),
-    usual("E101 E103", rf"\b(\d+)\s*(?:times|x)\s+({PARTS})", r"(\2) at least \1 times at most \1 times"),
-    usual("E127 E134", rf"\brepeat\s+({PARTS})\s+until\s+({PARTS})", r"\1+ \2"),
+    usual("E101 E103", rf"\b(\d+)\s*(?:times|x)\s+({ITEM})", r"(\2) at least \1 times at most \1 times"),
+    usual("E127 E134", rf"\brepeat\s+({ITEM})\s+until\s+({ITEM})", r"\1+ \2"),
     usual("E101 E103 E134", r"\b(?:maximum|max|up\s+to|no\s+more\s+than)\s+(\d+)\s+times?\b",
            r"at most \1 times"),
     usual("E101 E103 E134", r"\b(?:minimum|min|no\s+(?:less|fewer)\s+than)\s+(\d+)\s+times?\b",
@@ -172,7 +176,7 @@ USUAL = (
     usual("E115", r"\b(for|within|after)\b", r"\1 5 s"),
     usual("E120", r"\s*[.;]\s*$", ""),
     usual("E121", r"//|--|%|/\*", "#"),
-    usual("E122", r"&&|\|\|", _sign_once),
+    usual("E122", r"&&|\|\|", _single_operator),
     usual("E124", rf"\bactor\s+({NAME})\s+(?=\w)(?!is\b)", r"actor \1 is "),
     usual("E124", rf"\bactor\s+({NAME})\s*=\s*", r"actor \1 is "),
     usual("E124", rf"\bactor\s+({NAME})\s+is\s*$", r"actor \1 is \1"),
@@ -188,13 +192,14 @@ USUAL = (
     usual("E101 E119 E116", r"((?:every|after) [\d.]+)\s*\w*\s*(?:and|or|,|-|\.\.)\s*([\d.]+)\s*(\w+)",
            r"\1 \3 to \2 \3"),
     usual("E208", r"\s*\bpauses\s+when\b.*$", ""),
-    usual("E133", rf"\b({SIGN})\s+(?:if|while|on|once|whenever)\b", r"\1 when"),
-    usual("E133", rf"\b({SIGN})\s+(?={NAME}\()", r"\1 when "),
-    usual("E133", rf"\b({MEANT})\s+(?:when|if|while|on)\b", lambda m: f"{SIGNS_MEANT[m[1]]} when"),
-    usual("E133", rf"\b({MEANT})\s+(?={NAME}\()", lambda m: f"{SIGNS_MEANT[m[1]]} when "),
+    usual("E133", rf"\b({CONDITION_KIND})\s+(?:if|while|on|once|whenever)\b", r"\1 when"),
+    usual("E133", rf"\b({CONDITION_KIND})\s+(?={NAME}\()", r"\1 when "),
+    usual("E133", rf"\b({CONDITION_SYNONYM})\s+(?:when|if|while|on)\b",
+           lambda m: f"{CONDITION_SYNONYMS[m[1]]} when"),
+    usual("E133", rf"\b({CONDITION_SYNONYM})\s+(?={NAME}\()", lambda m: f"{CONDITION_SYNONYMS[m[1]]} when "),
     usual("E134", r"\b(at\s+(?:least|most)\s+\d+)\b(?!\s*times?)", r"\1 times"),
     usual("E134", r"\b(at\s+(?:least|most))\s+(once|twice|thrice)\b",
-           lambda m: f"{m[1]} {OFTEN[m[2]]}"),
+           lambda m: f"{m[1]} {COUNT_WORDS[m[2]]}"),
     usual("E134", r"\btwice\b", "at least 2 times at most 2 times"),
     usual("E134", r"\b(?:thrice|three times)\b", "at least 3 times at most 3 times"),
     usual(
@@ -208,10 +213,10 @@ USUAL = (
     usual("E134", rf"\brepeat(?:edly)?\s+({CALL}|<[^>]*>)", r"\1+"),
     usual("E134", r"\b(\d+)\s*(?:times|x)\b", r"at least \1 times at most \1 times"),
     usual("E135", r"\bin\s+(?=any\s+order)", ""),
-    usual("E135 E101", rf"\b(any\s+order|any\s+\d+\s+of)\s+({PARTS}(?:\s*(?:,|and|or)\s*{PARTS})+)",
-           lambda m: f"{m[1]} ({', '.join(re.findall(PARTS, m[2]))})"),
-    usual("E135", rf"\b(any\s+order|any\s+\d+\s+of)\s*\(\s*({PARTS}(?:\s+{PARTS})+)\s*\)",
-           lambda m: f"{m[1]} ({', '.join(re.findall(PARTS, m[2]))})"),
+    usual("E135 E101", rf"\b(any\s+order|any\s+\d+\s+of)\s+({ITEM}(?:\s*(?:,|and|or)\s*{ITEM})+)",
+           lambda m: f"{m[1]} ({', '.join(re.findall(ITEM, m[2]))})"),
+    usual("E135", rf"\b(any\s+order|any\s+\d+\s+of)\s*\(\s*({ITEM}(?:\s+{ITEM})+)\s*\)",
+           lambda m: f"{m[1]} ({', '.join(re.findall(ITEM, m[2]))})"),
     usual("E101 E103 E115", r"\bfor\s+(?:each|every|any)\s+(?:other|next|another)\s+", "for each new "),
     usual("E101 E115", rf"\bfor\s+each\s+new\s+(?={NAME}\s*\(([^()]*,)?\s*({NAME})\s*\))",
            r"for each new \2 "),
@@ -220,9 +225,9 @@ USUAL = (
            r"\1 \2 \5 \3 \4 \5"),
     usual("E101 E116", r"\bfor\s+([\d.]+)\s*(?:[a-z]+\s*)?(?:to|-)\s*([\d.]+)\s*([a-z]+)",
            r"for \1 \3 within \2 \3"),
-    usual("E101 E103", rf"\b(?:wait|pause|delay)(?:\s+for)?\s+({TIME})\s*({PARTS})", r"\2 after \1"),
-    usual("E101 E103 E119", rf"({PARTS})\s+optional(?:ly)?\b", r"\1?"),
-    usual("E101 E103 E119", rf"\boptional(?:ly)?\s+({PARTS})", r"\1?"),
+    usual("E101 E103", rf"\b(?:wait|pause|delay)(?:\s+for)?\s+({TIME})\s*({ITEM})", r"\2 after \1"),
+    usual("E101 E103 E119", rf"({ITEM})\s+optional(?:ly)?\b", r"\1?"),
+    usual("E101 E103 E119", rf"\boptional(?:ly)?\s+({ITEM})", r"\1?"),
     usual("E124", rf"\bactor\s+({NAME})\s+(?:are|was|means|equals|be)\b", r"actor \1 is"),
     usual("E124", r"\b(is|and)\s+(largest|smallest|leftmost|rightmost|highest|lowest)\b", r"\1 the \2"),
     usual("E115 E116 E127", rf"\b(for|within|after)\s+(?:[a-z]+\s+){{1,3}}(?={TIME})", r"\1 "),
@@ -242,10 +247,10 @@ USUAL = (
     usual("E127", rf"\b(?:if)\s+({CALL})\s*(?:then)?", r"\1"),
     usual("E108", r"<\s*([^<>]+?)\s*>", lambda m: f"<{re.sub(r'[^0-9a-zA-Z_]+', '_', m[1])}>"),
     usual("E107", rf"<({NAME})(?![\w>])", r"<\1>"),
-    usual("E201", rf"\b({NAME})(?=\s*\()", lambda m: _action_meant(m[1].lower())),
+    usual("E201", rf"\b({NAME})(?=\s*\()", lambda m: _intended_action(m[1].lower())),
     usual("E201", rf"\b{NAME}(?=\s*\(\s*{NAME}\s*\))", "moving"),
     usual("E201", rf"\b({NAME})\(\s*({NAME})\s*,\s*({NAME})\s*\)",
-           lambda m: f"{_action_meant(m[1])}({m[2]}) & {_action_meant(m[1])}({m[3]})"),
+           lambda m: f"{_intended_action(m[1])}({m[2]}) & {_intended_action(m[1])}({m[3]})"),
     usual("E202", rf"<({NAME})>\s*", ""),
     usual("E205", rf"\b({NAME})\(\s*({NAME})\s*,\s*({NAME})\s*(?:,[^()]*)?\)", r"\1(\2, \3)"),
     usual("E205", rf"\b({NAME})\(\s*({NAME})\s*,[^()]*\)", r"\1(\2)"),
@@ -281,7 +286,7 @@ USUAL = (
     usual("E228", rf"\b{NAME}(\([^(),]*\))(?=\s*[<>])", r"speed\1"),
     usual("E228", r"(\))\s*[<>]=?\s*[\d.]+\s*[a-z%/]*", r"\1"),
     usual("E233", r"\bat\s+least\s+(\d+)\s+times\s+at\s+most\s+(\d+)", r"at least \2 times at most \1"),
-    usual("E234", rf",\s*({PARTS})\s*\)(?=[^()]*$)", r") \1"),
+    usual("E234", rf",\s*({ITEM})\s*\)(?=[^()]*$)", r") \1"),
     usual("E238", r"\band\s+([\d.]+)\s*([a-z%/]+)", lambda m: f"and {2 * float(m[1]) or 1:g} {m[2]}"),
     usual("E229", rf"\b(\w+)\(\s*({NAME})\s*,\s*({NAME})\s*\)", r"\1(\3, \2)"),
     usual("E229", rf"\b{NAME}(\(\s*{NAME}\s*,\s*{NAME}\s*\))", r"inside\1"),
@@ -291,7 +296,7 @@ USUAL = (
     usual("E101 E103 E119", rf"(?<![\w>])({PAIR})", r"touching\1"),
     usual("E126", r"([?*+])\s*(<[^>]*>|\([^()]*\))", r"\2\1"),
 )  # fmt: skip
-"""In order of trial."""
+"""Tried in this order."""
 
 _FAILURE = r"(?:failures?|fail(?:s|ed|ing)?|errors?)"
 _TARGET = rf"(?:stage\s+)?({CALL}|<\s*{NAME}\s*>|{NAME})"
@@ -304,29 +309,31 @@ _STAGE = re.compile(rf"<\s*({NAME})\s*>\s*::=([^\n]*)")
 
 
 def recoveries(text: str, line: str) -> Iterator[tuple[re.Match[str], str]]:
-    """What a line means that tells, in whatever words, what is done when something has failed.
+    """Recoveries that a line may mean, written in other words: what to do after a failure.
 
-    What fails is the stage that is named, or that asks for the action that is named, or that stands on the
-    same line, or the first one beside the task.
+    The failed stage is the one named, or one that requires the named action, or the stage of this line, or
+    the first one after the task.
 
     Args:
         text: The whole file.
         line: A line of it.
 
     Yields:
-        What stands there, and the beginning of a recovery in its place.
+        The matched text, and the beginning of a recovery that replaces it.
     """
     stages = {m[1]: m[2] for m in _STAGE.finditer(text)}
-    here = _STAGE.match(line.lstrip())
+    own_stage = _STAGE.match(line.lstrip())
     for match in _RECOVERY.finditer(line):
-        said = match[1] or match[2] or ""
-        bare = said.strip("<> ")
-        asking = (name for name, course in stages.items() if said and _same_call(said, course))
-        meant = [bare] if bare in stages else [*asking]
-        meant += [here[1]] if here else [*stages][1:2]
-        yield from ((match, f"on failure of <{name}>: ") for name in dict.fromkeys(meant))
+        target = match[1] or match[2] or ""
+        stage = target.strip("<> ")
+        requiring = (
+            name for name, course in stages.items() if target and _same_call(target, course)
+        )
+        candidates = [stage] if stage in stages else [*requiring]
+        candidates += [own_stage[1]] if own_stage else [*stages][1:2]
+        yield from ((match, f"on failure of <{name}>: ") for name in dict.fromkeys(candidates))
 
 
-def _same_call(said: str, course: str) -> bool:
-    """Whether a course asks for what is said, blanks aside."""
-    return "".join(said.split()) in "".join(course.split("on failure")[0].split())
+def _same_call(call: str, course: str) -> bool:
+    """Whether a course contains a call, apart from blanks."""
+    return "".join(call.split()) in "".join(course.split("on failure")[0].split())

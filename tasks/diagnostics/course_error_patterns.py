@@ -199,7 +199,7 @@ def periodic(text: str) -> RecognisedError | None:
 
 
 STAGE_CONDITIONS = "`begins when`, `ends when`, `progresses when`, `fails when` or `pauses when`"
-SIGNS_MEANT = {
+CONDITION_SYNONYMS = {
     "starts": "begins", "stops": "ends", "pause": "pauses", "paused": "pauses", "suspends": "pauses",
     "suspended": "pauses", "interrupted": "pauses", "interrupts": "pauses", "waits": "pauses",
     "halts": "pauses",
@@ -210,12 +210,12 @@ SIGNS_MEANT = {
 def signs(text: str) -> RecognisedError | None:
     """A stage condition (`begins when`, ...) without a condition or without `when`."""
     m = re.search(
-        rf"[>)?*+smh]\s+((?:begins|ends|progresses|fails|pauses|{'|'.join(SIGNS_MEANT)})\b)"
+        rf"[>)?*+smh]\s+((?:begins|ends|progresses|fails|pauses|{'|'.join(CONDITION_SYNONYMS)})\b)"
         r"(?!\s+when\b)",
         text,
     )
     if m is not None:
-        meant = SIGNS_MEANT.get(m[1], m[1])
+        meant = CONDITION_SYNONYMS.get(m[1], m[1])
         what = f"`{m[1]}` is not followed by `when` and a condition"
         return RecognisedError(
             "E133", m.start(1), len(m[1]), what, f"`{meant} when touching(arm, satellite)`"
@@ -225,7 +225,7 @@ def signs(text: str) -> RecognisedError | None:
         what = "`when` is not followed by a condition"
         expected = "such as `when touching(arm, satellite) and not converging(arm, satellite)`"
         return RecognisedError("E133", m.start(), 4, what, expected)
-    m = re.search(rf"\b({'|'.join(SIGNS_MEANT)}|succeeds|completes)\s+when\b", text)
+    m = re.search(rf"\b({'|'.join(CONDITION_SYNONYMS)}|succeeds|completes)\s+when\b", text)
     if m is not None:
         what = f"`{m[1]} when` is not part of the language"
         return RecognisedError("E133", m.start(1), len(m[1]), what, STAGE_CONDITIONS)

@@ -5,7 +5,7 @@ import pytest
 from visup.rules.language.diagnostics import Diagnostic
 from visup.rules.language.fixes import fix_of
 from visup.tasks.checks.diagnose import diagnose
-from visup.tasks.checks.repairs import with_tried_hints
+from visup.tasks.checks.repairs import with_tested_hints
 
 STAGES = [
     "<a> ::= not touching(x, y)",
@@ -108,5 +108,5 @@ def test_of_many_mistakes_few_have_their_hints_tried() -> None:
         tried += 1
         return faults
 
-    with_tried_hints(text, faults, check)
+    with_tested_hints(text, faults, check)
     assert 0 < tried <= 20
