@@ -5,9 +5,9 @@ Kim and Demiris, "Learning action symbols for hierarchical grammar induction", 2
 all runs is preserved and any other order left free, as in a task graph.
 
 Read in this order: `traces.py` (a run as intervals), `meetings.py` (contacts, without those of carried
-objects), `relevance.py` (the event sequence of each run), `carrying.py` (who is carried, and where to),
+objects), `relevance.py` (the event sequence of each run), `carrying.py` (carrying and its destination),
 `alignment.py` (removal of repeated events), `order.py` (loops and partial order), `periods.py` (periodic
-loops), `places.py` and `rests.py` (where things end up, who keeps near to whom, who stays or comes to rest),
+loops), `places.py` and `rests.py` (final places, staying near without contact, actors at rest),
 `drafts.py` (a task and its text), `induction.py` (the task file), `fitting.py` (durations of an existing
 task).
 """

@@ -10,12 +10,10 @@ from collections import Counter
 from collections.abc import Sequence
 
 from visup.tasks.learning.order import Item
-from visup.tasks.learning.relevance import CourseEvent
-
-Row = Sequence[CourseEvent]
+from visup.tasks.learning.relevance import CourseEvent, EventSequence
 
 
-def aligned(rows: Sequence[Row]) -> list[list[CourseEvent]]:
+def with_common_counts(rows: Sequence[EventSequence]) -> list[list[CourseEvent]]:
     """The rows with each item reduced to its lowest count over all runs, unless that is zero.
 
     Args:
@@ -26,23 +24,25 @@ def aligned(rows: Sequence[Row]) -> list[list[CourseEvent]]:
     counts = [Counter(e.item for e in row) for row in rows]
     least = {item: min(c[item] for c in counts) for item in set().union(*counts)}
     shortest = [e.item for e in min(rows, key=len)]
-    return [_without_noise(row, shortest, least) for row in rows]
+    return [_with_least_counts(row, shortest, least) for row in rows]
 
 
-def _without_noise(row: Row, shortest: Sequence[Item], least: dict[Item, int]) -> list[CourseEvent]:
+def _with_least_counts(
+    row: EventSequence, shortest: Sequence[Item], least: dict[Item, int]
+) -> list[CourseEvent]:
     """One row with each item that all runs have reduced to its least count."""
     items = [e.item for e in row]
-    shared = set(longest_common(items, shortest))
+    common = set(longest_common_subsequence(items, shortest))
     selected: set[int] = set()
     for item, count in least.items():
         places = [k for k, i in enumerate(items) if i == item]
         # Items of the common subsequence first, then the earliest.
-        ranked = sorted(places, key=lambda k: (k not in shared, k))
+        ranked = sorted(places, key=lambda k: (k not in common, k))
         selected.update(ranked[:count] if count else places)
     return [e for k, e in enumerate(row) if k in selected]
 
 
-def longest_common(one: Sequence[Item], other: Sequence[Item]) -> list[int]:
+def longest_common_subsequence(one: Sequence[Item], other: Sequence[Item]) -> list[int]:
     """Indices in the first sequence of the longest common subsequence; the earliest of several."""
     best = [[0] * (len(other) + 1) for _ in range(len(one) + 1)]
     for i in reversed(range(len(one))):

@@ -1,8 +1,8 @@
-"""Actors that rest against each other as one body: who meets one of them meets both.
+"""Merges the contacts of a third actor with two that rest against each other.
 
-Which of the two outlines is met first, and whether the other one is met in the image at all, hangs on the
-view. In place of the two contacts there is one event: the contact with the one that moves less, if all runs
-have it; else either is evidence.
+Which of the two outlines is touched first, and whether the other one is touched in the image at all,
+depends on the view. The two contacts become one event: the contact with the actor that moves less, if all
+runs have it; else either contact is evidence.
 """
 
 from __future__ import annotations
@@ -10,16 +10,18 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from visup.tasks.learning.relevance import CourseEvent
-from visup.tasks.learning.traces import Happening, RunTrace, Symbol
+from visup.tasks.learning.relevance import CourseEvent, EventSequence
+from visup.tasks.learning.traces import ActionInterval, RunTrace, Symbol
 
-Row = Sequence[CourseEvent]
 PASSING_S = 1.0
-"""Contacts that are so short, and end so soon after the two have met, were in passing, seconds."""
+"""Contacts that last no longer than this, and end no later than this after the first contact of the two, are
+incidental, seconds."""
 
 
-def as_one_body(rows: Sequence[Row], runs: Sequence[RunTrace]) -> list[list[CourseEvent]]:
-    """The events of each run, with contacts with either of two that rest against each other as one event.
+def with_resting_bodies_merged(
+    rows: Sequence[EventSequence], runs: Sequence[RunTrace]
+) -> list[list[CourseEvent]]:
+    """The events of each run; contacts with two actors that rest against each other become one event.
 
     Args:
         rows: The relevant events of each run, in order.
@@ -27,7 +29,10 @@ def as_one_body(rows: Sequence[Row], runs: Sequence[RunTrace]) -> list[list[Cour
     """
     found = [list(row) for row in rows]
     for base, one, other in _alternatives(rows, runs):
-        if all(any(e.symbol == one for e in _meant(row, base, (one, other))) for row in rows):
+        if all(
+            any(e.symbol == one for e in _contacts_not_in_passing(row, base, (one, other)))
+            for row in rows
+        ):
             found = [[e for e in row if not _of_pair(e, other, "converging")] for row in found]
         else:
             found = [_merged(row, base, one, other) for row in found]
@@ -40,14 +45,14 @@ def moved_s(runs: Sequence[RunTrace], actor: str) -> float:
 
 
 def _alternatives(
-    rows: Sequence[Row], runs: Sequence[RunTrace]
+    rows: Sequence[EventSequence], runs: Sequence[RunTrace]
 ) -> Iterator[tuple[Symbol, Symbol, Symbol]]:
-    """A contact that lasts in all runs, and two that follow it: of a third actor with each of the two.
+    """A contact that lasts in all runs, and the contacts of a third actor with each of its two actors.
 
-    First that with the one of the two that moves less.
+    The contact with the actor that moves less comes first.
     """
     contacts = sorted({e.symbol for row in rows for e in row if e.symbol[0] == "touching"})
-    for base in (s for s in contacts if all(_lasting(row, s) for row in rows)):
+    for base in (s for s in contacts if all(_lasts_in(row, s) for row in rows)):
         first, second = sorted(base[1], key=lambda a: moved_s(runs, a))
         for third in sorted({a for _, pair in contacts for a in pair} - set(base[1])):
             one, other = (("touching", tuple(sorted((third, a)))) for a in (first, second))
@@ -56,41 +61,43 @@ def _alternatives(
                 yield base, one, other
 
 
-def _lasting(row: Row, symbol: Symbol) -> bool:
-    return any(e.symbol == symbol and e.lasts for e in row)
+def _lasts_in(row: EventSequence, symbol: Symbol) -> bool:
+    return any(e.symbol == symbol and e.lasts_to_end for e in row)
 
 
-def _follows(row: Row, base: Symbol, contacts: tuple[Symbol, Symbol]) -> bool:
-    """Whether a run has one of the contacts at least, and none before the base but in passing."""
-    meant = _meant(row, base, contacts)
-    return bool(meant) and meant[0].at > _begin(row, base)
+def _follows(row: EventSequence, base: Symbol, contacts: tuple[Symbol, Symbol]) -> bool:
+    """Whether a run has at least one of the contacts, and all but incidental ones after the base."""
+    relevant = _contacts_not_in_passing(row, base, contacts)
+    return bool(relevant) and relevant[0].at > _begin(row, base)
 
 
-def _meant(row: Row, base: Symbol, contacts: tuple[Symbol, Symbol]) -> list[CourseEvent]:
-    """The contacts of a run, without those in passing."""
+def _contacts_not_in_passing(
+    row: EventSequence, base: Symbol, contacts: tuple[Symbol, Symbol]
+) -> list[CourseEvent]:
+    """The contacts of a run, without incidental ones."""
     begin = _begin(row, base)
 
-    def in_passing(contact: Happening) -> bool:
+    def in_passing(contact: ActionInterval) -> bool:
         return max(contact.end - contact.begin, contact.end - begin) <= PASSING_S
 
-    return [e for e in row if e.symbol in contacts and not in_passing(e.happening)]
+    return [e for e in row if e.symbol in contacts and not in_passing(e.interval)]
 
 
-def _begin(row: Row, base: Symbol) -> float:
+def _begin(row: EventSequence, base: Symbol) -> float:
     return min(e.at for e in row if e.symbol == base)
 
 
-def _merged(row: Row, base: Symbol, one: Symbol, other: Symbol) -> list[CourseEvent]:
-    """A row in which the first of two contacts stands for both, to the end of the later one."""
-    meant = _meant(row, base, (one, other))
-    first, end = meant[0], max(e.happening.end for e in meant)
-    happening = Happening(one, first.happening.begin, end, first.happening.begun)
-    lasts = any(e.lasts for e in meant)
-    event = replace(first, happening=happening, lasts=lasts, instead=(other,))
+def _merged(row: EventSequence, base: Symbol, one: Symbol, other: Symbol) -> list[CourseEvent]:
+    """A row with the two contacts merged: the first begins, the later one ends."""
+    relevant = _contacts_not_in_passing(row, base, (one, other))
+    first, end = relevant[0], max(e.interval.end for e in relevant)
+    interval = ActionInterval(one, first.interval.begin, end, first.interval.begin_observed)
+    lasts_to_end = any(e.lasts_to_end for e in relevant)
+    event = replace(first, interval=interval, lasts_to_end=lasts_to_end, alternatives=(other,))
     kept = (e for e in row if e is first or not (_of_pair(e, one) or _of_pair(e, other)))
     return [event if e is first else e for e in kept]
 
 
 def _of_pair(event: CourseEvent, contact: Symbol, *more: str) -> bool:
-    """Whether an event is a contact of a pair, or its end, or more of that pair."""
+    """Whether an event is a contact of a pair or its end, or one of `more` actions of that pair."""
     return event.symbol[1] == contact[1] and event.symbol[0] in ("touching", "apart", *more)

@@ -1,8 +1,9 @@
-"""What follows a coupling and a release: carrying to a destination or away, and drawing back.
+"""Adds a stage of carrying after a coupling, and a retreat after a release.
 
-Who is coupled and moves along is carried. The stage says so, and where to: to whom is met next, or else
-that the carried one moves. It fails when the two come apart. Nothing is carried where that is met next comes
-by itself, or that somebody else still holds. Each is added only where all runs show it.
+An actor that is coupled to another and moves with it is carried. The stage names the destination: the actor
+that the carried one meets next, or, if there is none, only its motion. It fails when the two separate. It
+is not added where the other actor comes by itself, or still holds the carried one, or where some run does
+not show it.
 """
 
 from __future__ import annotations
@@ -12,18 +13,17 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from visup.tasks.learning.meetings import CARRIED_S, MEETINGS, Pair
-from visup.tasks.learning.relevance import AT_ONCE_S, CourseEvent
+from visup.tasks.learning.relevance import SIMULTANEOUS_S, CourseEvent, EventSequence
 from visup.tasks.learning.rests import at_rest
-from visup.tasks.learning.traces import Happening, RunTrace, Span, Symbol
+from visup.tasks.learning.traces import ActionInterval, RunTrace, Span, Symbol
 
-Row = Sequence[CourseEvent]
 NEXT_S = 1e-3
-"""What follows an event directly is this much later, seconds."""
+"""Offset that orders an event directly after another one, seconds."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Carriage:
-    """One coupling of a run, and what came next.
+    """A coupling of a run, and the next contact of its actors.
 
     Attributes:
         coupling: Its event.
@@ -36,8 +36,10 @@ class _Carriage:
     to: Pair | None
 
 
-def with_carrying(rows: Sequence[Row], runs: Sequence[RunTrace]) -> list[list[CourseEvent]]:
-    """The rows with a stage after each coupling in which one carries the other, and after each release.
+def with_carrying(
+    rows: Sequence[EventSequence], runs: Sequence[RunTrace]
+) -> list[list[CourseEvent]]:
+    """The rows with carrying added after couplings, and a retreat after releases.
 
     Args:
         rows: The relevant events of each run, in order.
@@ -45,24 +47,24 @@ def with_carrying(rows: Sequence[Row], runs: Sequence[RunTrace]) -> list[list[Co
     """
     found = _without_passing(rows)
     for pair in _pairs(rows, "coupled"):
-        found = _carried(found, runs, pair)
+        found = _with_carrying_of(found, runs, pair)
     for pair in _pairs(rows, "decoupled"):
-        found = _drawn_back(found, runs, pair)
+        found = _with_retreats(found, runs, pair)
     return found
 
 
-def _without_passing(rows: Sequence[Row]) -> list[list[CourseEvent]]:
-    """Rows without contacts in passing: what is carried past its destination meets it again later.
+def _without_passing(rows: Sequence[EventSequence]) -> list[list[CourseEvent]]:
+    """Rows without incidental contacts: an object carried past its destination touches it again later.
 
-    Those that all runs have equally often are meant.
+    Contacts that occur equally often in all runs are retained.
     """
     counts = [Counter(e.symbol for e in row if e.symbol[0] == "touching") for row in rows]
     varied = {s for c in counts for s in c if len({d[s] for d in counts}) > 1}
     return [[e for e in row if not _in_passing(e, row, varied)] for row in rows]
 
 
-def _in_passing(event: CourseEvent, row: Row, varied: Collection[Symbol]) -> bool:
-    """Whether an event is a contact, or its end, and who is carried meets the same one again later."""
+def _in_passing(event: CourseEvent, row: EventSequence, varied: Collection[Symbol]) -> bool:
+    """Whether an event is a contact, or its end, that a carried actor repeats later."""
     contact = ("touching", event.symbol[1])
     if event.symbol[0] not in ("touching", "apart") or contact not in varied:
         return False
@@ -71,30 +73,32 @@ def _in_passing(event: CourseEvent, row: Row, varied: Collection[Symbol]) -> boo
         e.symbol[0] == "coupled"
         and len(set(e.symbol[1]) & set(contact[1])) == 1
         and e.at < event.at
-        and any(at < e.happening.end for at in later)
+        and any(at < e.interval.end for at in later)
         for e in row
     )
 
 
-def _pairs(rows: Sequence[Row], action: str) -> list[Pair]:
+def _pairs(rows: Sequence[EventSequence], action: str) -> list[Pair]:
     return sorted({e.symbol[1] for row in rows for e in row if e.symbol[0] == action})
 
 
-def _carried(rows: Sequence[Row], runs: Sequence[RunTrace], pair: Pair) -> list[list[CourseEvent]]:
+def _with_carrying_of(
+    rows: Sequence[EventSequence], runs: Sequence[RunTrace], pair: Pair
+) -> list[list[CourseEvent]]:
     """Rows with the carrying of a pair, if each of its couplings shows it in all runs."""
     carriages = [list(_carriages(row, pair)) for row in rows]
     spans = [
-        [_together(run, pair, (c.coupling.at, c.until)) for c in mine]
+        [_joint_motion(run, pair, (c.coupling.at, c.until)) for c in mine]
         for run, mine in zip(runs, carriages, strict=True)
     ]
     if not all(span for row in spans for span in row) or any(
-        _comes(run, c) or _held_by_other(row, c)
+        _comes_by_itself(run, c) or _coupled_to_third(row, c)
         for run, row, mine in zip(runs, rows, carriages, strict=True)
         for c in mine
     ):
         return [list(row) for row in rows]
     towards = all(
-        c.to is not None and _nearing(run, c.to, (c.coupling.at, c.until))
+        c.to is not None and _comes_closer(run, c.to, (c.coupling.at, c.until))
         for run, mine in zip(runs, carriages, strict=True)
         for c in mine
     )
@@ -102,7 +106,9 @@ def _carried(rows: Sequence[Row], runs: Sequence[RunTrace], pair: Pair) -> list[
     found = []
     for row, mine, own in zip(rows, carriages, spans, strict=True):
         events = [
-            _carrying(c, span, ("converging", c.to) if towards and c.to else ("moving", (cargo,)))
+            _carrying_event(
+                c, span, ("converging", c.to) if towards and c.to else ("moving", (cargo,))
+            )
             for c, span in zip(mine, own, strict=True)
             if span
         ]
@@ -110,7 +116,7 @@ def _carried(rows: Sequence[Row], runs: Sequence[RunTrace], pair: Pair) -> list[
     return found
 
 
-def _carriages(row: Row, pair: Pair) -> Iterator[_Carriage]:
+def _carriages(row: EventSequence, pair: Pair) -> Iterator[_Carriage]:
     for k, event in enumerate(row):
         if event.symbol != ("coupled", pair):
             continue
@@ -119,14 +125,14 @@ def _carriages(row: Row, pair: Pair) -> Iterator[_Carriage]:
             e for e in later if e.symbol[0] in MEETINGS and len(set(e.symbol[1]) & set(pair)) == 1
         )
         meeting = next(meets, None)
-        if meeting is not None and meeting.at > event.happening.end:
+        if meeting is not None and meeting.at > event.interval.end:
             meeting = None
-        until = meeting.at if meeting is not None else event.happening.end
+        until = meeting.at if meeting is not None else event.interval.end
         yield _Carriage(event, until, meeting.symbol[1] if meeting is not None else None)
 
 
-def _comes(run: RunTrace, carriage: _Carriage) -> bool:
-    """Whether the one that is met next comes by itself, as somebody who takes over does."""
+def _comes_by_itself(run: RunTrace, carriage: _Carriage) -> bool:
+    """Whether the actor met next moves by itself, as one that takes over does."""
     if carriage.to is None:
         return False
     span = carriage.coupling.at, carriage.until
@@ -138,23 +144,23 @@ def _comes(run: RunTrace, carriage: _Carriage) -> bool:
 
 
 def _moved_s(run: RunTrace, name: str, within: Span) -> float:
-    """How long somebody moved within an interval, seconds."""
+    """How long an actor moved within an interval, seconds."""
     spans = run.moves.get(name, ())
     return sum(max(0.0, min(b, within[1]) - max(a, within[0])) for a, b in spans)
 
 
-def _held_by_other(row: Row, carriage: _Carriage) -> bool:
-    """Whether one of two is coupled to a third when they are coupled."""
+def _coupled_to_third(row: EventSequence, carriage: _Carriage) -> bool:
+    """Whether one of two actors is still coupled to a third when they become coupled."""
     pair, at = set(carriage.coupling.symbol[1]), carriage.coupling.at
     return any(
         e.symbol[0] == "coupled"
         and len(set(e.symbol[1]) & pair) == 1
-        and e.happening.begin < at < e.happening.end
+        and e.interval.begin < at < e.interval.end
         for e in row
     )
 
 
-def _together(run: RunTrace, pair: Pair, within: Span) -> Span | None:
+def _joint_motion(run: RunTrace, pair: Pair, within: Span) -> Span | None:
     """From when to when both of a pair move, or None if that is too short."""
     one, other = (run.moves.get(name, ()) for name in pair)
     both = [
@@ -168,10 +174,13 @@ def _together(run: RunTrace, pair: Pair, within: Span) -> Span | None:
     return min(a for a, _ in both), max(b for _, b in both)
 
 
-def _nearing(run: RunTrace, pair: Pair, within: Span) -> bool:
-    """Whether two come closer within an interval."""
-    spells = (h for h in run.happenings if h.symbol == ("converging", pair))
-    return any(min(h.end, within[1]) - max(h.begin, within[0]) > AT_ONCE_S for h in spells)
+def _comes_closer(run: RunTrace, pair: Pair, within: Span) -> bool:
+    """Whether two actors converge within an interval."""
+    approaches = (interval for interval in run.intervals if interval.symbol == ("converging", pair))
+    return any(
+        min(interval.end, within[1]) - max(interval.begin, within[0]) > SIMULTANEOUS_S
+        for interval in approaches
+    )
 
 
 def _cargo(pair: Pair, runs: Sequence[RunTrace], carriages: Sequence[Sequence[_Carriage]]) -> str:
@@ -188,29 +197,31 @@ def _cargo(pair: Pair, runs: Sequence[RunTrace], carriages: Sequence[Sequence[_C
     return min(pair, key=before)
 
 
-def _carrying(carriage: _Carriage, span: Span, goal: Symbol) -> CourseEvent:
+def _carrying_event(carriage: _Carriage, span: Span, goal: Symbol) -> CourseEvent:
     symbol = ("moving_together", carriage.coupling.symbol[1])
     at = max(span[0], carriage.coupling.at + NEXT_S)
-    return CourseEvent(Happening(symbol, at, span[1]), at, carries=goal)
+    return CourseEvent(ActionInterval(symbol, at, span[1]), at, carried_symbol=goal)
 
 
-def _drawn_back(
-    rows: Sequence[Row], runs: Sequence[RunTrace], pair: Pair
+def _with_retreats(
+    rows: Sequence[EventSequence], runs: Sequence[RunTrace], pair: Pair
 ) -> list[list[CourseEvent]]:
-    """Rows with the two drawing apart after each release, if all runs show it."""
+    """Rows with a retreat of the two after each release, if all runs show it."""
     found = []
     for row, run in zip(rows, runs, strict=True):
         releases = [e for e in row if e.symbol == ("decoupled", pair)]
-        events = [_drawing_back(run, e, pair) for e in releases]
+        events = [_retreat(run, e, pair) for e in releases]
         if None in events:
             return [list(r) for r in rows]
         found.append(sorted([*row, *(e for e in events if e)], key=lambda e: e.at))
     return found
 
 
-def _drawing_back(run: RunTrace, release: CourseEvent, pair: Pair) -> CourseEvent | None:
-    spells = (h for h in run.happenings if h.symbol == ("diverging", pair))
-    last = next((h for h in spells if h.end > release.at + AT_ONCE_S), None)
+def _retreat(run: RunTrace, release: CourseEvent, pair: Pair) -> CourseEvent | None:
+    retreats = (interval for interval in run.intervals if interval.symbol == ("diverging", pair))
+    last = next(
+        (interval for interval in retreats if interval.end > release.at + SIMULTANEOUS_S), None
+    )
     if last is None:
         return None
     at = max(last.begin, release.at + NEXT_S)

@@ -1,4 +1,4 @@
-"""A task during induction: its course, what is required besides, and its text with the evidence."""
+"""A task during induction: its course, its further requirements, and its text with the evidence."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from math import ceil, floor, inf
 from visup.tasks.grammar.nodes import Actor
 from visup.tasks.learning.meetings import MEETINGS
 from visup.tasks.learning.order import (
-    KEEPING,
-    Carry,
-    Either,
-    Free,
+    STAYING_NEAR,
+    CarryingStage,
+    Conjunction,
+    Disjunction,
     Item,
-    Joint,
-    Keep,
     Loop,
+    LoopCounts,
     Occurrence,
     Plan,
+    Proximity,
     Series,
-    Times,
+    Unordered,
     action_text,
     final_of,
     leaves_of,
@@ -30,8 +30,8 @@ from visup.tasks.learning.periods import Period, course_of
 from visup.tasks.learning.places import PLACED_S, FinalPlace, Release
 from visup.tasks.learning.precedence import Precedence, invariants
 from visup.tasks.learning.relevance import CourseEvent
-from visup.tasks.learning.rests import Halt, Rest
-from visup.tasks.learning.traces import BREAK_S, RunTrace, Symbol
+from visup.tasks.learning.rests import FinalRest, RestingActor
+from visup.tasks.learning.traces import LONGEST_BRIDGED_GAP_S, RunTrace, Symbol
 
 STAGE_NAMES = {
     "converging": "approach",
@@ -41,22 +41,23 @@ STAGE_NAMES = {
     "diverging": "retreat",
     "moving_together": "carry",
     "apart": "part",
-    KEEPING: "keep",
+    STAYING_NEAR: "keep",
 }
 MARGIN = 3.0
 """Deadline of a stage as a multiple of its longest duration in a good run."""
 LEAST_DEADLINE_S = 10.0
-HELD_SHARE = 0.5
+HOLD_SHARE = 0.5
 LONGEST_HOLD_S = 6.0
-"""The last stage must hold for `HELD_SHARE` of its shortest duration, capped at `LONGEST_HOLD_S`."""
-STAY = "stay"
-"""Name of the stage in which those that have met stay as they are."""
-RESTED_SHARE = 0.65
-"""Who comes to rest must rest for this share of the shortest rest in a good run, capped likewise."""
+"""The last stage must hold for `HOLD_SHARE` of its shortest duration, capped at `LONGEST_HOLD_S`."""
+STAY_STAGE = "stay"
+"""Name of the stage in which the actors of the last contact stay in place."""
+REST_SHARE = 0.65
+"""An actor that comes to rest must rest for this share of the shortest rest in a good run, capped
+likewise."""
 COMPLETE = (*MEETINGS, "moving_together", "diverging")
 """Last events that are complete when they end or have lasted: no later event terminates them."""
 LONGEST_RETREAT_S = 1.0
-"""Cap of the shortest duration of a last stage in which two draw apart: recordings end soon after it."""
+"""Cap of the least duration of a final retreat: recordings end soon after it."""
 
 
 @dataclass
@@ -66,44 +67,44 @@ class Draft:
     Attributes:
         name: Of the task.
         plan: Its course.
-        times: Least and greatest number of iterations of each loop.
+        loop_counts: Least and greatest number of iterations of each loop.
         runs: Good runs.
         rows: The events of each run.
         declared: Actors as the runs' own tasks declare them.
         forbidden: Symbols that must never occur.
-        holding: Whether the last stage must hold for a while.
-        keeping: Whether a stage of carrying fails when the two come apart.
+        last_stage_holds: Whether the last stage must hold for a while.
+        carrying_may_fail: Whether a stage of carrying fails when the two come apart.
         periods: The periodic loops.
-        rests: Actors that must not be pushed.
-        order: Contacts that must not come too early.
-        places: How those that were brought together lie in the end.
-        halt: Who comes to rest in the last stage.
+        resting_actors: Actors that must not be pushed.
+        precedences: Contacts that must not come too early.
+        places: Final places of the actors in contact.
+        final_rest: The actor that comes to rest in the last stage.
         release: The release with which it ends.
     """
 
     name: str
     plan: Plan
-    times: Times
+    loop_counts: LoopCounts
     runs: Sequence[RunTrace]
     rows: Sequence[Sequence[CourseEvent]]
     declared: Mapping[str, Actor]
     forbidden: list[Symbol] = field(default_factory=list)
-    holding: bool = True
-    keeping: bool = True
+    last_stage_holds: bool = True
+    carrying_may_fail: bool = True
     periods: dict[Loop, Period] = field(default_factory=dict)
-    rests: tuple[Rest, ...] = ()
-    order: tuple[Precedence, ...] = ()
+    resting_actors: tuple[RestingActor, ...] = ()
+    precedences: tuple[Precedence, ...] = ()
     places: tuple[FinalPlace, ...] = ()
-    halt: Halt | None = None
+    final_rest: FinalRest | None = None
     release: Release | None = None
 
     def text(self) -> str:
         """The task file."""
         names = stage_names(self.plan)
         lines = [f"# {self.name}: learned from {runs_text(len(self.runs))}"]
-        staying = self._staying()
-        # A motion in passing may be left out where what lasts after it is asked for.
-        last = ("?" if self.release is not None else "") + (f" <{STAY}>" if staying else "")
+        staying = self._stay_stage()
+        # The retreat is optional where a stage after it requires what lasts.
+        last = ("?" if self.release is not None else "") + (f" <{STAY_STAGE}>" if staying else "")
         course = _course(self.plan, names) + last
         lines.append(f"<{self.name}> ::= {course}")
         lines += [self._stage(o, name) for o, name in names.items()]
@@ -112,11 +113,11 @@ class Draft:
         lines += [
             f"never {action_text(s)}  # in no good run, and in a bad one" for s in self.forbidden
         ]
-        seen = f"  # in {all_text(len(self.runs))}"
-        lines += [line + seen for line in invariants(self.order, names)]
+        seen = f"  # in {all_runs_text(len(self.runs))}"
+        lines += [line + seen for line in invariants(self.precedences, names)]
         early = [p for p in self.places if not (p.of_last or self.release)]
-        lines += [p.invariant(names[p.stage], all_text(len(self.runs))) for p in early]
-        lines += [rest.invariant(all_text(len(self.runs))) for rest in self.rests]
+        lines += [p.invariant(names[p.stage], all_runs_text(len(self.runs))) for p in early]
+        lines += [rest.invariant(all_runs_text(len(self.runs))) for rest in self.resting_actors]
         return "\n".join(lines) + "\n"
 
     def actors(self) -> list[str]:
@@ -129,103 +130,107 @@ class Draft:
         if isinstance(item, Loop) and item in self.periods:
             return f"<{name}> ::= {course_of(item, self.periods[item])}"
         if isinstance(item, Loop):
-            least, most = self.times[item]
+            least, most = self.loop_counts[item]
             body = " ".join(map(_part_text, item.body))
-            said = f"{least} to {most} times in a row"
-            return f"<{name}> ::= ({body}) at least {least} times at most {most} times  # {said}"
+            count_text = f"{least} to {most} times in a row"
+            return (
+                f"<{name}> ::= ({body}) at least {least} times at most {most} times  # {count_text}"
+            )
         spans = self._spans(occurrence)
         seen = f"in {len(spans)} of {runs_text(len(self.runs))}"
-        if isinstance(item, Keep):
-            return f"<{name}> ::= {action_text(item)} for {item.held_s:g} s  # {seen}"
-        if not spans or (self._last(occurrence) and not self._settled()):
-            held = self._held(occurrence) if self._last(occurrence) else 0.0
-            course = self._asked(occurrence, f" for {held:g} s" if held else "")
+        if isinstance(item, Proximity):
+            return f"<{name}> ::= {action_text(item)} for {item.least_s:g} s  # {seen}"
+        if not spans or (self._is_last(occurrence) and not self._final_facts()):
+            held = self._least_hold_s(occurrence) if self._is_last(occurrence) else 0.0
+            course = self._stage_body(occurrence, f" for {held:g} s" if held else "")
             return f"<{name}> ::= {course}  # {seen}"
-        took = f"{min(spans):.1f} to {max(spans):.1f} s"
-        if self.release is not None and self._last(occurrence):
+        duration_text = f"{min(spans):.1f} to {max(spans):.1f} s"
+        if self.release is not None and self._is_last(occurrence):
             return f"<{name}> ::= {action_text(item)}  # {seen}"
-        course = self._asked(occurrence, f" within {deadline(spans)} s")
-        return f"<{name}> ::= {course}  # {seen}, {took}"
+        course = self._stage_body(occurrence, f" within {deadline(spans)} s")
+        return f"<{name}> ::= {course}  # {seen}, {duration_text}"
 
-    def _asked(self, occurrence: Occurrence, clause: str) -> str:
-        """What a stage asks for, with a clause of time."""
+    def _stage_body(self, occurrence: Occurrence, clause: str) -> str:
+        """The body of a stage, with a clause of time."""
         item = occurrence[0]
-        already = self._from_the_start(occurrence) or self._meanwhile(occurrence)
-        if isinstance(item, Carry):
-            return f"({action_text(item)}){clause}{self._kept(item)}"
-        if isinstance(item, Either):
+        already = self._held_from_start(occurrence) or self._may_begin_early(occurrence)
+        if isinstance(item, CarryingStage):
+            return f"({action_text(item)}){clause}{self._carrying_failure(item)}"
+        if isinstance(item, Disjunction):
             word = "already " if already else ""
             return " | ".join(f"{word}{action_text(part)}{clause}" for part in item.parts)
         action = action_text(item)
-        if self.release is not None and item == self.release.parted:
-            # Who has let go is apart, too, which may be seen before or after.
+        if self.release is not None and item == self.release.symbol:
+            # After a release the two are apart, too, which may be observed before or after it.
             return f"{action}{clause} | {action_text(('apart', item[1]))}{clause}"
-        if isinstance(item, Joint) and (clause or already):
+        if isinstance(item, Conjunction) and (clause or already):
             action = f"({action})"
         return f"{'already ' if already else ''}{action}{clause}"
 
-    def _settled(self) -> list[str]:
-        """What holds in the end besides the last contact: how the two lie, and that one rests."""
-        asked = (p for p in self.places if p.of_last or self.release is not None)
-        found = [f"{p.quantity} > {p.least} %" for p in asked]
-        return found + ([self.halt.fact] if self.halt is not None else [])
+    def _final_facts(self) -> list[str]:
+        """Requirements of the last stage besides its contact: shared outlines, and an actor at rest."""
+        places = (p for p in self.places if p.of_last or self.release is not None)
+        found = [f"{p.quantity} > {p.least} %" for p in places]
+        return found + ([self.final_rest.fact] if self.final_rest is not None else [])
 
-    def _staying(self) -> str:
-        """A stage after the last contact, which may be in passing; empty if no more is known than that."""
-        final, facts = final_of(self.plan), self._settled()
+    def _stay_stage(self) -> str:
+        """A stage after the last contact that requires the final facts; empty if there are none."""
+        final, facts = final_of(self.plan), self._final_facts()
         if self.release is not None:
-            # What shares an outline touches, though it may seem to pass while a third one moves there.
-            placed = {p.contact for p in self.places}
-            lasting = [s for s in self.release.kept if s not in placed]
-            asked = " & ".join([*map(action_text, lasting), *facts])
-            # It holds already where the retreat was seen.
-            asked = f"({asked})" if " & " in asked else asked
-            lasts = f"already {asked} for {PLACED_S:g} s"
-            return f"<{STAY}> ::= {lasts}  # in {all_text(len(self.runs))}"
+            # A shared outline implies contact, even while a third actor moves there.
+            placed_contacts = {p.contact for p in self.places}
+            lasting = [s for s in self.release.lasting_contacts if s not in placed_contacts]
+            facts_text = " & ".join([*map(action_text, lasting), *facts])
+            # It may hold already when the retreat is observed.
+            facts_text = f"({facts_text})" if " & " in facts_text else facts_text
+            body = f"already {facts_text} for {PLACED_S:g} s"
+            return f"<{STAY_STAGE}> ::= {body}  # in {all_runs_text(len(self.runs))}"
         if final is None or not facts:
             return ""
-        held = self._held(final)
+        held = self._least_hold_s(final)
         clause = f" for {held:g} s" if held else ""
-        asked = " & ".join([action_text(final[0]), *facts])
-        return f"<{STAY}> ::= ({asked}){clause}  # in {all_text(len(self.runs))}"
+        facts_text = " & ".join([action_text(final[0]), *facts])
+        return f"<{STAY_STAGE}> ::= ({facts_text}){clause}  # in {all_runs_text(len(self.runs))}"
 
-    def _kept(self, item: Carry) -> str:
-        """Carrying fails when the two come apart for longer than relations flicker."""
+    def _carrying_failure(self, item: CarryingStage) -> str:
+        """The condition under which carrying fails: the two are apart for longer than relations flicker."""
         apart = action_text(("apart", item.parts[0][1]))
-        return f" fails when {apart} for {BREAK_S:g} s" if self.keeping else ""
+        return (
+            f" fails when {apart} for {LONGEST_BRIDGED_GAP_S:g} s" if self.carrying_may_fail else ""
+        )
 
-    def _last(self, occurrence: Occurrence) -> bool:
+    def _is_last(self, occurrence: Occurrence) -> bool:
         plan = self.plan
         while isinstance(plan, Series):
             plan = plan.parts[-1]
         return occurrence in leaves_of(plan)
 
-    def _from_the_start(self, occurrence: Occurrence) -> bool:
+    def _held_from_start(self, occurrence: Occurrence) -> bool:
         """Whether an event held from the start of some run, as far as was observed."""
         found = [event_of(row, occurrence) for row in self.rows]
-        return any(e is not None and not e.happening.begun for e in found)
+        return any(e is not None and not e.interval.begin_observed for e in found)
 
-    def _meanwhile(self, occurrence: Occurrence) -> bool:
+    def _may_begin_early(self, occurrence: Occurrence) -> bool:
         """Whether a lasting meeting is one of several in any order, so that it may begin during others."""
         if occurrence not in _single_parts(self.plan):
             return False
         found = [event_of(row, occurrence) for row in self.rows]
-        return all(e is not None and e.lasts and e.symbol[0] in MEETINGS for e in found)
+        return all(e is not None and e.lasts_to_end and e.symbol[0] in MEETINGS for e in found)
 
-    def _held(self, occurrence: Occurrence) -> float:
+    def _least_hold_s(self, occurrence: Occurrence) -> float:
         """How long the last event must hold, seconds; 0 if it does not last to the end."""
-        if not self.holding:
+        if not self.last_stage_holds:
             return 0.0
         found = [event_of(row, occurrence) for row in self.rows]
         # A meeting is complete when it ends or has lasted: no later event terminates it.
-        if not all(e is not None and (e.lasts or e.symbol[0] in COMPLETE) for e in found):
+        if not all(e is not None and (e.lasts_to_end or e.symbol[0] in COMPLETE) for e in found):
             return 0.0
-        shortest = min(e.happening.end - e.happening.begin for e in found if e is not None)
-        if self.halt is not None:
-            return floor(2 * RESTED_SHARE * min(self.halt.rested_s, LONGEST_HOLD_S)) / 2
+        shortest = min(e.interval.end - e.interval.begin for e in found if e is not None)
+        if self.final_rest is not None:
+            return floor(2 * REST_SHARE * min(self.final_rest.rested_s, LONGEST_HOLD_S)) / 2
         drawing_back = any(e is not None and e.symbol[0] == "diverging" for e in found)
         most = LONGEST_RETREAT_S if drawing_back else LONGEST_HOLD_S
-        return max(0.0, floor(2 * HELD_SHARE * min(shortest, most)) / 2)
+        return max(0.0, floor(2 * HOLD_SHARE * min(shortest, most)) / 2)
 
     def _spans(self, occurrence: Occurrence) -> list[float]:
         """Greatest duration of a stage in each run: from the event before it to the event after it.
@@ -237,12 +242,12 @@ class Draft:
         found = []
         for run, row in zip(self.runs, self.rows, strict=True):
             begins = {o: t for o in course if (t := begin_of(row, o)) is not None}
-            mine = begins.pop(occurrence, None)
-            if mine is None:
+            own_begin = begins.pop(occurrence, None)
+            if own_begin is None:
                 continue
-            earlier = [t for t in begins.values() if t < mine]
-            later = [t for t in begins.values() if t > mine]
-            found.append(min(later, default=mine) - max(earlier, default=run.begin))
+            earlier = [t for t in begins.values() if t < own_begin]
+            later = [t for t in begins.values() if t > own_begin]
+            found.append(min(later, default=own_begin) - max(earlier, default=run.begin))
         return found
 
 
@@ -250,23 +255,23 @@ def _single_parts(plan: Plan) -> list[Occurrence]:
     """The stages that are by themselves one of several in any order."""
     if isinstance(plan, Series):
         return [o for p in plan.parts for o in _single_parts(p)]
-    if isinstance(plan, Free):
-        return [p for p in plan.parts if not isinstance(p, Series | Free)]
+    if isinstance(plan, Unordered):
+        return [p for p in plan.parts if not isinstance(p, Series | Unordered)]
     return []
 
 
 def stage_names(plan: Plan) -> dict[Occurrence, str]:
     """A unique name for each stage: its action, then its actors, then a number."""
     occurrences = leaves_of(plan)
-    plain = [_plain(o[0]) for o in occurrences]
+    plain = [_action_name(o[0]) for o in occurrences]
     found: dict[Occurrence, str] = {}
     for occurrence, word in zip(occurrences, plain, strict=True):
-        name = word if plain.count(word) == 1 else f"{word}_{_who(occurrence[0])}"
+        name = word if plain.count(word) == 1 else f"{word}_{_actor_names(occurrence[0])}"
         number = 2
-        tried = name
-        while tried in found.values():
-            tried, number = f"{name}_{number}", number + 1
-        found[occurrence] = tried
+        unique = name
+        while unique in found.values():
+            unique, number = f"{name}_{number}", number + 1
+        found[occurrence] = unique
     return found
 
 
@@ -283,7 +288,7 @@ def event_of(row: Sequence[CourseEvent], occurrence: Occurrence) -> CourseEvent 
 def begin_of(row: Sequence[CourseEvent], occurrence: Occurrence) -> float | None:
     """When an occurrence began in a run, seconds, or None."""
     found = event_of(row, occurrence)
-    return None if found is None else found.happening.begin
+    return None if found is None else found.interval.begin
 
 
 def deadline(spans: Sequence[float]) -> int:
@@ -295,7 +300,7 @@ def deadline(spans: Sequence[float]) -> int:
 def _course(plan: Plan, names: Mapping[Occurrence, str]) -> str:
     if isinstance(plan, Series):
         return " ".join(_course(p, names) for p in plan.parts)
-    if isinstance(plan, Free):
+    if isinstance(plan, Unordered):
         return f"any order ({', '.join(_course(p, names) for p in plan.parts)})"
     return f"<{names[plan]}>"
 
@@ -306,20 +311,20 @@ def _part_text(item: Item) -> str:
     return text if isinstance(item, tuple | Loop) else f"({text})"
 
 
-def _plain(item: Item) -> str:
+def _action_name(item: Item) -> str:
     if isinstance(item, Loop):
         return "repeat"
-    if isinstance(item, Carry):
+    if isinstance(item, CarryingStage):
         return STAGE_NAMES["moving_together"]
     words = [STAGE_NAMES.get(action, action) for action, _ in symbols_of(item)]
     return "_and_".join(dict.fromkeys(words))
 
 
-def _who(item: Item) -> str:
+def _actor_names(item: Item) -> str:
     return "_".join(dict.fromkeys(a for _, actors in symbols_of(item) for a in actors))
 
 
-def all_text(count: int) -> str:
+def all_runs_text(count: int) -> str:
     """All of some runs: `3 of 3 runs`."""
     return f"{count} of {runs_text(count)}"
 

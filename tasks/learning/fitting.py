@@ -92,7 +92,7 @@ def _pauses(course: Course) -> bool:
     )
 
 
-def _took(stage: str, run: JudgedRun, *, pauses: bool) -> Iterator[float]:
+def _durations(stage: str, run: JudgedRun, *, pauses: bool) -> Iterator[float]:
     """Duration of a stage in a run that completed it, seconds, with or without its pauses."""
     if stage in run.spans():
         begin, end = run.spans()[stage]
@@ -101,15 +101,15 @@ def _took(stage: str, run: JudgedRun, *, pauses: bool) -> Iterator[float]:
 
 def _fitted(clause: Clause, runs: Sequence[JudgedRun]) -> FittedAmount | None:
     stage, word, amount, pauses = clause
-    took = [seconds for r in runs for seconds in _took(stage, r, pauses=pauses)]
-    if not took:
+    durations = [seconds for r in runs for seconds in _durations(stage, r, pauses=pauses)]
+    if not durations:
         return None
     new = (
-        deadline(took)
+        deadline(durations)
         if word == "within"
-        else max(0.5, floor(20 * SHORTEST_SHARE * min(took)) / 20)
+        else max(0.5, floor(20 * SHORTEST_SHARE * min(durations)) / 20)
     )
     if abs(value(amount) - new) < 1e-9:
         return None
-    seen = f"{len(took)} of {len(runs)} runs, {min(took):.1f} to {max(took):.1f} s"
+    seen = f"{len(durations)} of {len(runs)} runs, {min(durations):.1f} to {max(durations):.1f} s"
     return FittedAmount(stage, f"{word} {amount}", f"{word} {new:g} s", seen, amount.span)

@@ -16,8 +16,8 @@ from visup.agent.model.errors import TaskError
 from visup.tasks.analysis.judging import JudgedRun, judged
 from visup.tasks.checks.load import parse_task
 from visup.tasks.grammar.nodes import Actor
-from visup.tasks.learning.alignment import aligned
-from visup.tasks.learning.bodies import as_one_body
+from visup.tasks.learning.alignment import with_common_counts
+from visup.tasks.learning.bodies import with_resting_bodies_merged
 from visup.tasks.learning.carrying import with_carrying
 from visup.tasks.learning.drafts import (
     Draft,
@@ -29,21 +29,26 @@ from visup.tasks.learning.order import (
     Occurrence,
     action_text,
     final_of,
+    frequent_occurrences,
     plan_of,
-    shared,
     symbols_of,
     with_approaches,
     with_loops,
     without,
 )
 from visup.tasks.learning.periods import periods_of
-from visup.tasks.learning.places import places_of, release_of, with_keeping
+from visup.tasks.learning.places import places_of, release_of, with_proximity
 from visup.tasks.learning.precedence import precedences
-from visup.tasks.learning.relevance import AT_ONCE_S, CourseEvent, joined, relevant
-from visup.tasks.learning.rests import halt_of, rests_of
+from visup.tasks.learning.relevance import (
+    SIMULTANEOUS_S,
+    CourseEvent,
+    relevant_events,
+    with_simultaneous_joined,
+)
+from visup.tasks.learning.rests import final_rest_of, resting_actors
 from visup.tasks.learning.traces import RunTrace, Span
 
-SHARE = 0.8
+COURSE_SHARE = 0.8
 """Least share of good runs in which an event occurs for it to be part of the course."""
 APPROACH_SHARE = 0.6
 """The same for the approach to a meeting that is part of the course."""
@@ -88,81 +93,93 @@ def learn_task(
     Raises:
         TaskError: The good runs have no event in common.
     """
-    rows = with_carrying(joined(as_one_body(relevant(good), good)), good)
-    rows = with_keeping(rows, good)
-    folded, times = with_loops([tuple(e.item for e in row) for row in rows])
-    if not times:  # without loops, surplus repeats in some runs are noise
-        rows = aligned(rows)
-        folded = [tuple(e.item for e in row) for row in rows]
-    core = with_approaches(shared(folded, SHARE), shared(folded, APPROACH_SHARE))
+    rows = _event_sequences(good)
+    item_strings, loop_counts = with_loops([tuple(e.item for e in row) for row in rows])
+    if not loop_counts:  # without loops, surplus repeats in some runs are noise
+        rows = with_common_counts(rows)
+        item_strings = [tuple(e.item for e in row) for row in rows]
+    core = with_approaches(
+        frequent_occurrences(item_strings, COURSE_SHARE),
+        frequent_occurrences(item_strings, APPROACH_SHARE),
+    )
     if not core:
         raise TaskError(
             "the runs have nothing in common that a task could ask for",
             expected="runs in which named objects approach, touch or couple",
             hint="name objects by --models, --teach or a task with actors, and record again",
         )
-    seen = {o for w in folded for o in shared([w], 1.0)}
-    dropped = [f"{_text(o)}: in some runs only" for o in sorted(seen - set(core), key=repr)]
-    plan = plan_of(folded, core, partial(_at_once, rows))
-    periods = periods_of(times, rows)
-    draft = Draft(name, plan, times, good, rows, declared or {}, periods=periods)
+    all_occurrences = {o for w in item_strings for o in frequent_occurrences([w], 1.0)}
+    dropped = [
+        f"{_occurrence_text(o)}: in some runs only"
+        for o in sorted(all_occurrences - set(core), key=repr)
+    ]
+    plan = plan_of(item_strings, core, partial(_order_may_be_random, rows))
+    periods = periods_of(loop_counts, rows)
+    draft = Draft(name, plan, loop_counts, good, rows, declared or {}, periods=periods)
     draft.release = release_of(plan, rows)
-    results = _validated(draft, dropped)
-    _require(draft, results)
-    bad_verdicts = {r.name: _judge(draft, r) for r in bad}
+    results = _relaxed_until_valid(draft, dropped)
+    _add_invariants(draft, results)
+    bad_verdicts = {r.name: _verdict(draft, r) for r in bad}
     for run in bad:
         if bad_verdicts[run.name] is Verdict.SUCCEEDED:
-            _forbid(draft, run)
+            _forbid_events_of(draft, run)
     if draft.forbidden:
-        bad_verdicts = {r.name: _judge(draft, r) for r in bad}
-        results = {r.name: _judge(draft, r) for r in good}
+        bad_verdicts = {r.name: _verdict(draft, r) for r in bad}
+        results = {r.name: _verdict(draft, r) for r in good}
     return LearnedTask(draft.text(), results, bad_verdicts, tuple(dropped))
 
 
-def _validated(draft: Draft, dropped: list[str]) -> dict[str, Verdict]:
+def _event_sequences(runs: Sequence[RunTrace]) -> list[list[CourseEvent]]:
+    """The relevant events of each run, with carrying, retreats and stays near each other added."""
+    rows = with_resting_bodies_merged(relevant_events(runs), runs)
+    rows = with_carrying(with_simultaneous_joined(rows), runs)
+    return with_proximity(rows, runs)
+
+
+def _relaxed_until_valid(draft: Draft, dropped: list[str]) -> dict[str, Verdict]:
     """Relax the draft until it accepts all good runs, as far as possible; returns their verdicts."""
     while True:
         task = parse_task(draft.text())
-        found = {r.name: judged(task, r.minds) for r in draft.runs if r.minds}
-        refused = [j for j in found.values() if j.verdict is not Verdict.SUCCEEDED]
-        blamed = _blamed(draft, refused[0]) if refused else None
-        if refused and draft.release is not None and blamed in (None, final_of(draft.plan)):
+        judged_runs = {r.name: judged(task, r.minds) for r in draft.runs if r.minds}
+        refused = [j for j in judged_runs.values() if j.verdict is not Verdict.SUCCEEDED]
+        failing = _failing_stage(draft, refused[0]) if refused else None
+        if refused and draft.release is not None and failing in (None, final_of(draft.plan)):
             draft.release = None
             continue
         if refused and draft.periods:
             draft.periods = {}
             continue
-        if refused and draft.keeping:
-            draft.keeping = False
+        if refused and draft.carrying_may_fail:
+            draft.carrying_may_fail = False
             continue
-        if refused and draft.holding:
-            draft.holding = False
+        if refused and draft.last_stage_holds:
+            draft.last_stage_holds = False
             continue
-        if blamed is None:
-            return {name: j.verdict for name, j in found.items()}
-        plan = without(draft.plan, blamed)
+        if failing is None:
+            return {name: j.verdict for name, j in judged_runs.items()}
+        plan = without(draft.plan, failing)
         if plan is None:
-            return {name: j.verdict for name, j in found.items()}
-        dropped.append(f"{_text(blamed)}: a good run would be refused by it")
+            return {name: j.verdict for name, j in judged_runs.items()}
+        dropped.append(f"{_occurrence_text(failing)}: a good run would be refused by it")
         draft.plan = plan
 
 
-def _require(draft: Draft, results: Mapping[str, Verdict]) -> None:
-    """Require what held in all good runs, unless that changes a verdict of one: order, places, rest."""
-    draft.order = tuple(precedences(draft.plan, draft.rows, draft.runs))
-    if draft.order and _verdicts(draft) != dict(results):
-        draft.order = ()
+def _add_invariants(draft: Draft, results: Mapping[str, Verdict]) -> None:
+    """Add what held in all good runs (order, places, rest), unless it changes a verdict of one."""
+    draft.precedences = tuple(precedences(draft.plan, draft.rows, draft.runs))
+    if draft.precedences and _verdicts(draft) != dict(results):
+        draft.precedences = ()
     if (
         not draft.periods
     ):  # a rhythm out of time fails softly, and a further stage would outweigh it
-        _settle(draft, results)
-    draft.rests = tuple(rests_of(draft.runs, draft.actors()))
-    if draft.rests and _verdicts(draft) != dict(results):
-        draft.rests = ()
+        _add_final_places(draft, results)
+    draft.resting_actors = tuple(resting_actors(draft.runs, draft.actors()))
+    if draft.resting_actors and _verdicts(draft) != dict(results):
+        draft.resting_actors = ()
 
 
-def _settle(draft: Draft, results: Mapping[str, Verdict]) -> None:
-    """Require where things lie in the end, and that they rest there, unless that changes a verdict."""
+def _add_final_places(draft: Draft, results: Mapping[str, Verdict]) -> None:
+    """Add the final places and the final rest, unless they change a verdict."""
     last = (
         draft.release.spans(draft.rows, draft.runs)
         if draft.release is not None
@@ -174,10 +191,10 @@ def _settle(draft: Draft, results: Mapping[str, Verdict]) -> None:
     if draft.places and _verdicts(draft) != dict(results):
         draft.places = ()
     final = final_of(draft.plan)
-    if draft.holding and final is not None:
-        draft.halt = halt_of(draft.runs, final)
-        if draft.halt is not None and _verdicts(draft) != dict(results):
-            draft.halt = None
+    if draft.last_stage_holds and final is not None:
+        draft.final_rest = final_rest_of(draft.runs, final)
+        if draft.final_rest is not None and _verdicts(draft) != dict(results):
+            draft.final_rest = None
 
 
 def _last_spans(draft: Draft) -> list[Span]:
@@ -195,10 +212,10 @@ def _last_spans(draft: Draft) -> list[Span]:
 
 
 def _verdicts(draft: Draft) -> dict[str, Verdict]:
-    return {r.name: _judge(draft, r) for r in draft.runs if r.minds}
+    return {r.name: _verdict(draft, r) for r in draft.runs if r.minds}
 
 
-def _blamed(draft: Draft, run: JudgedRun) -> Occurrence | None:
+def _failing_stage(draft: Draft, run: JudgedRun) -> Occurrence | None:
     """The stage that refuses a run: the first one that is not done."""
     for occurrence, name in stage_names(draft.plan).items():
         if run.statuses.get(name) is not Status.DONE:
@@ -206,33 +223,35 @@ def _blamed(draft: Draft, run: JudgedRun) -> Occurrence | None:
     return None
 
 
-def _judge(draft: Draft, run: RunTrace) -> Verdict:
+def _verdict(draft: Draft, run: RunTrace) -> Verdict:
     return judged(parse_task(draft.text()), run.minds).verdict
 
 
-def _forbid(draft: Draft, run: RunTrace) -> None:
+def _forbid_events_of(draft: Draft, run: RunTrace) -> None:
     """Forbid events that occurred in a bad run and in no good one."""
-    allowed = {h.symbol for r in draft.runs for h in r.happenings}
-    actors = {a for r in draft.runs for h in r.happenings for a in h.symbol[1]}
-    for happening in run.happenings:
-        action, who = happening.symbol
-        new = happening.symbol not in allowed and happening.symbol not in draft.forbidden
+    allowed = {interval.symbol for r in draft.runs for interval in r.intervals}
+    actors = {a for r in draft.runs for interval in r.intervals for a in interval.symbol[1]}
+    for interval in run.intervals:
+        action, who = interval.symbol
+        new = interval.symbol not in allowed and interval.symbol not in draft.forbidden
         if new and action in FORBIDDEN and actors.intersection(who):
-            draft.forbidden.append(happening.symbol)
+            draft.forbidden.append(interval.symbol)
 
 
-def _at_once(rows: Sequence[Sequence[CourseEvent]], a: Occurrence, b: Occurrence) -> bool:
+def _order_may_be_random(
+    rows: Sequence[Sequence[CourseEvent]], a: Occurrence, b: Occurrence
+) -> bool:
     """Whether two occurrences are so close in some run that their order may be random."""
     events = [(event_of(row, a), event_of(row, b)) for row in rows]
     pairs = [(x, y) for x, y in events if x is not None and y is not None]
     if any(_pairs(x.item) & _pairs(y.item) for x, y in pairs):
         return False
-    return any(abs(x.at - y.at) < AT_ONCE_S for x, y in pairs)
+    return any(abs(x.at - y.at) < SIMULTANEOUS_S for x, y in pairs)
 
 
 def _pairs(item: Item) -> set[tuple[str, ...]]:
     return {actors for _, actors in symbols_of(item)}
 
 
-def _text(occurrence: Occurrence) -> str:
+def _occurrence_text(occurrence: Occurrence) -> str:
     return action_text(occurrence[0])

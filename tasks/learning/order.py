@@ -13,10 +13,10 @@ from statistics import mean
 
 from visup.tasks.learning.traces import Symbol
 
-KEEPING = "keeping"
-"""Action of the symbol of `Keep`; no action of the task language."""
+STAYING_NEAR = "keeping"
+"""Action of the symbol of `Proximity`; no action of the task language."""
 LONGEST_LOOP = 6
-MOST_FREE = 6
+MOST_UNORDERED = 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,40 +27,40 @@ class Loop:
 
 
 @dataclass(frozen=True, slots=True)
-class Joint:
+class Conjunction:
     """Symbols that begin at about the same time and overlap: a conjunction."""
 
     parts: tuple[Symbol, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Carry(Joint):
-    """One of two carries the other: they move together, and what the carried one does meanwhile."""
+class CarryingStage(Conjunction):
+    """One actor carries another: they move together, and what the carried one does meanwhile."""
 
 
 @dataclass(frozen=True, slots=True)
-class Either:
+class Disjunction:
     """Symbols of which any is evidence of one event."""
 
     parts: tuple[Symbol, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Keep:
-    """Two that meet nowhere keep near each other.
+class Proximity:
+    """Two actors that never meet stay near each other.
 
     Attributes:
         pair: The two.
-        below_px: Gap of their outlines that they keep below, pixels.
-        held_s: For how long at least, seconds.
+        below_px: Upper limit of the gap between their outlines, pixels.
+        least_s: For how long at least, seconds.
     """
 
     pair: tuple[str, ...]
     below_px: int
-    held_s: float
+    least_s: float
 
 
-Item = Symbol | Loop | Joint | Either | Keep
+Item = Symbol | Loop | Conjunction | Disjunction | Proximity
 Word = tuple[Item, ...]
 
 
@@ -72,15 +72,15 @@ class Series:
 
 
 @dataclass(frozen=True, slots=True)
-class Free:
-    """Parts once each, in any order."""
+class Unordered:
+    """Parts that occur once each, in any order."""
 
     parts: tuple[Plan, ...]
 
 
 Occurrence = tuple[Item, int]
 """The n-th occurrence of a symbol or loop in a run, from 0."""
-Plan = Occurrence | Series | Free
+Plan = Occurrence | Series | Unordered
 
 
 def with_loops(words: Sequence[Word]) -> tuple[list[Word], dict[Loop, tuple[int, int]]]:
@@ -91,13 +91,15 @@ def with_loops(words: Sequence[Word]) -> tuple[list[Word], dict[Loop, tuple[int,
     """
     found, times = list(words), dict[Loop, tuple[int, int]]()
     while True:
-        best = max(_candidates(found), key=lambda c: (_gain(found, c), -len(c)), default=None)
-        if best is None or _gain(found, best) <= 0:
+        best = max(
+            _candidates(found), key=lambda c: (_symbols_saved(found, c), -len(c)), default=None
+        )
+        if best is None or _symbols_saved(found, best) <= 0:
             return found, times
         loop = Loop(best)
         counts = [n for w in found for n in _repeats(w, best)]
         times[loop] = min(counts), max(counts)
-        found = [_folded(w, best, loop) for w in found]
+        found = [_with_loop(w, best, loop) for w in found]
 
 
 def _candidates(words: Sequence[Word]) -> set[Word]:
@@ -110,7 +112,7 @@ def _candidates(words: Sequence[Word]) -> set[Word]:
     return found
 
 
-def _gain(words: Sequence[Word], block: Word) -> int:
+def _symbols_saved(words: Sequence[Word], block: Word) -> int:
     """Symbols saved by writing all words with the loop, less the loop itself."""
     saved = sum(n * len(block) - 1 for w in words for n in _repeats(w, block))
     return saved - (len(block) + 1)
@@ -128,7 +130,7 @@ def _repeats(word: Word, block: Word) -> list[int]:
     return found
 
 
-def _folded(word: Word, block: Word, loop: Loop) -> Word:
+def _with_loop(word: Word, block: Word, loop: Loop) -> Word:
     found: list[Item] = []
     at, size = 0, len(block)
     while at < len(word):
@@ -152,48 +154,50 @@ def numbered(word: Word) -> list[Occurrence]:
     return found
 
 
-def shared(words: Sequence[Word], share: float) -> list[Occurrence]:
+def frequent_occurrences(words: Sequence[Word], share: float) -> list[Occurrence]:
     """Occurrences in at least this share of the words, by mean relative position."""
     places: dict[Occurrence, list[float]] = {}
     for word in words:
         for place, occurrence in enumerate(numbered(word)):
             places.setdefault(occurrence, []).append(place / max(1, len(word)))
-    core = [o for o, p in places.items() if len(p) >= share * len(words)]
-    return sorted(core, key=lambda o: (mean(places[o]), repr(o)))
+    frequent = [o for o, p in places.items() if len(p) >= share * len(words)]
+    return sorted(frequent, key=lambda o: (mean(places[o]), repr(o)))
 
 
 def with_approaches(core: Sequence[Occurrence], frequent: Sequence[Occurrence]) -> list[Occurrence]:
     """The core with those of the frequent occurrences that are approaches to a meeting of the core.
 
-    Who meets has come nearer before, though not in every view: what is lifted over the other and let down
-    on it may seem to draw away.
+    Actors converge before they meet, but not in every view: one that is lifted over the other and let down
+    on it may seem to diverge.
 
     Args:
         core: Occurrences of nearly all words.
         frequent: Occurrences of fewer words, in order; all of the core are among them.
     """
-    met = {s[1] for o in core for s in symbols_of(o[0]) if s[0] in ("touching", "coupled")}
-    nears = {o for o in frequent if o[0] in {("converging", pair) for pair in met} and o[1] == 0}
-    return [o for o in frequent if o in nears or o in core]
+    met_pairs = {s[1] for o in core for s in symbols_of(o[0]) if s[0] in ("touching", "coupled")}
+    approaches = {
+        o for o in frequent if o[0] in {("converging", pair) for pair in met_pairs} and o[1] == 0
+    }
+    return [o for o in frequent if o in approaches or o in core]
 
 
 def plan_of(
     words: Sequence[Word],
     core: Sequence[Occurrence],
-    at_once: Callable[[Occurrence, Occurrence], bool] = lambda a, b: False,
+    may_be_random: Callable[[Occurrence, Occurrence], bool] = lambda a, b: False,
 ) -> Plan:
     """The plan common to all words: in sequence where all agree on the order, else free.
 
     Args:
         words: The runs.
         core: The occurrences of the plan.
-        at_once: Whether two occurrences are so close in time that their order may be random.
+        may_be_random: Whether two occurrences are so close in time that their order may be random.
     """
     ranks = [{o: k for k, o in enumerate(numbered(w))} for w in words]
 
     def before(a: Occurrence, b: Occurrence) -> bool:
         common = [r for r in ranks if a in r and b in r]
-        return bool(common) and all(r[a] < r[b] for r in common) and not at_once(a, b)
+        return bool(common) and all(r[a] < r[b] for r in common) and not may_be_random(a, b)
 
     return _plan(list(core), before)
 
@@ -210,7 +214,7 @@ def _plan(items: list[Occurrence], before: Callable[[Occurrence, Occurrence], bo
         return Series(tuple(_plan(b, before) for b in blocks))
     groups = _components(items, before)
     if len(groups) > 1:
-        return Free(tuple(_plan(g, before) for g in groups[:MOST_FREE]))
+        return Unordered(tuple(_plan(g, before) for g in groups[:MOST_UNORDERED]))
     # A partial order that does not decompose: fall back to the mean order, which most runs follow.
     return Series(tuple(items))
 
@@ -222,14 +226,14 @@ def _components(
     group: dict[Occurrence, int] = {o: k for k, o in enumerate(items)}
     for a, b in combinations(items, 2):
         if before(a, b) or before(b, a):
-            old, new = group[b], group[a]
-            group = {o: new if g == old else g for o, g in group.items()}
+            merged, kept = group[b], group[a]
+            group = {o: kept if g == merged else g for o, g in group.items()}
     return [[o for o in items if group[o] == g] for g in dict.fromkeys(group.values())]
 
 
 def leaves_of(plan: Plan) -> list[Occurrence]:
     """The occurrences of a plan, in order."""
-    if isinstance(plan, Series | Free):
+    if isinstance(plan, Series | Unordered):
         return [o for p in plan.parts for o in leaves_of(p)]
     return [plan]
 
@@ -238,12 +242,12 @@ def final_of(plan: Plan) -> Occurrence | None:
     """The occurrence with which a plan ends, or None where any of several may be the last."""
     while isinstance(plan, Series):
         plan = plan.parts[-1]
-    return None if isinstance(plan, Free) else plan
+    return None if isinstance(plan, Unordered) else plan
 
 
 def without(plan: Plan, dropped: Occurrence) -> Plan | None:
     """The plan without one of its occurrences; None if that leaves it empty."""
-    if not isinstance(plan, Series | Free):
+    if not isinstance(plan, Series | Unordered):
         return None if plan == dropped else plan
     parts = tuple(p for part in plan.parts if (p := without(part, dropped)) is not None)
     if len(parts) <= 1:
@@ -251,15 +255,15 @@ def without(plan: Plan, dropped: Occurrence) -> Plan | None:
     return type(plan)(parts)
 
 
-Times = Mapping[Loop, tuple[int, int]]
+LoopCounts = Mapping[Loop, tuple[int, int]]
 
 
 def symbols_of(item: Item) -> list[Symbol]:
     """The symbols of an item, in order."""
-    if isinstance(item, Joint | Either):
+    if isinstance(item, Conjunction | Disjunction):
         return list(item.parts)
-    if isinstance(item, Keep):
-        return [(KEEPING, item.pair)]
+    if isinstance(item, Proximity):
+        return [(STAYING_NEAR, item.pair)]
     return [s for i in item.body for s in symbols_of(i)] if isinstance(item, Loop) else [item]
 
 
@@ -267,11 +271,11 @@ def action_text(symbol: Item) -> str:
     """An item as a course of a task file."""
     if isinstance(symbol, Loop):
         return " ".join(map(action_text, symbol.body))
-    if isinstance(symbol, Joint):
+    if isinstance(symbol, Conjunction):
         return " & ".join(map(action_text, symbol.parts))
-    if isinstance(symbol, Either):
+    if isinstance(symbol, Disjunction):
         return " | ".join(map(action_text, symbol.parts))
-    if isinstance(symbol, Keep):
+    if isinstance(symbol, Proximity):
         return f"gap({', '.join(symbol.pair)}) < {symbol.below_px} px"
     action, actors = symbol
     return f"{action}({', '.join(actors)})"

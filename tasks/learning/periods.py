@@ -11,13 +11,13 @@ from itertools import pairwise
 from math import ceil, floor
 
 from visup.tasks.learning.meetings import MEETINGS
-from visup.tasks.learning.order import Loop, Times
+from visup.tasks.learning.order import Loop, LoopCounts
 from visup.tasks.learning.relevance import CourseEvent
 from visup.tasks.learning.traces import Symbol
 
-LEAST_BEATS = 4
+LEAST_REPETITIONS = 4
 """Fewer repetitions in a run cannot be told from chance."""
-STEADIEST, EVEN = 0.25, 2.0
+SHORTEST_PERIOD_S, MOST_PERIOD_RATIO = 0.25, 2.0
 """Shortest period that is accepted, seconds, and greatest ratio of the longest to the shortest one."""
 MARGIN = 1.5
 """Factor by which a period may exceed the extremes of the good runs, either way."""
@@ -26,7 +26,7 @@ Period = tuple[float, float]
 """Shortest and longest time from one beginning to the next, seconds."""
 
 
-def periods_of(times: Times, rows: Sequence[Sequence[CourseEvent]]) -> dict[Loop, Period]:
+def periods_of(times: LoopCounts, rows: Sequence[Sequence[CourseEvent]]) -> dict[Loop, Period]:
     """The periodic loops, with their periods in the runs.
 
     Args:
@@ -35,22 +35,25 @@ def periods_of(times: Times, rows: Sequence[Sequence[CourseEvent]]) -> dict[Loop
     """
     found: dict[Loop, Period] = {}
     for loop, (least, most) in times.items():
-        beat = beat_of(loop)
-        steps = [_steps(row, beat) for row in rows] if beat and least != most else []
-        every = [s for row in steps for s in row]
-        if not every or min(map(len, steps)) < LEAST_BEATS - 1:
+        meeting = repeated_meeting(loop)
+        steps = [_steps(row, meeting) for row in rows] if meeting and least != most else []
+        all_steps = [s for row in steps for s in row]
+        if not all_steps or min(map(len, steps)) < LEAST_REPETITIONS - 1:
             continue
-        if max(every) <= EVEN * min(every) and min(every) >= STEADIEST:
-            found[loop] = (min(every), max(every))
+        if (
+            max(all_steps) <= MOST_PERIOD_RATIO * min(all_steps)
+            and min(all_steps) >= SHORTEST_PERIOD_S
+        ):
+            found[loop] = (min(all_steps), max(all_steps))
     return found
 
 
-def beat_of(loop: Loop) -> Symbol | None:
+def repeated_meeting(loop: Loop) -> Symbol | None:
     """The meeting of a loop that is one meeting of one pair, with its approach and end; else None."""
     symbols = [s for s in loop.body if isinstance(s, tuple)]
     meetings = [s for s in symbols if s[0] in MEETINGS]
-    alone = len(symbols) == len(loop.body) and len({s[1] for s in symbols}) == 1
-    return meetings[0] if alone and len(meetings) == 1 else None
+    single_pair = len(symbols) == len(loop.body) and len({s[1] for s in symbols}) == 1
+    return meetings[0] if single_pair and len(meetings) == 1 else None
 
 
 def with_margin(period: Period) -> Period:
@@ -63,10 +66,10 @@ def course_of(loop: Loop, period: Period) -> str:
     """The body of a periodic stage, with the observed period as a comment."""
     least, most = with_margin(period)
     bounds = f"{least:g} s to {most:g} s" if least else f"{most:g} s"
-    action, actors = beat_of(loop) or ("", ())
+    action, actors = repeated_meeting(loop) or ("", ())
     return f"{action}({', '.join(actors)}) every {bounds}  # every {period[0]:.1f} to {period[1]:.1f} s"
 
 
-def _steps(row: Sequence[CourseEvent], beat: Symbol) -> list[float]:
-    begins = [e.happening.begin for e in row if e.symbol == beat]
+def _steps(row: Sequence[CourseEvent], meeting: Symbol) -> list[float]:
+    begins = [e.interval.begin for e in row if e.symbol == meeting]
     return [b - a for a, b in pairwise(begins)]

@@ -1,7 +1,7 @@
-"""Parts that are put together in one order: what comes later in all good runs must not have come before.
+"""Order of assembly: a contact that comes later in all good runs must not hold before the earlier one.
 
-A contact that holds already when the one before it comes about would satisfy a stage that asks for both, so
-the order is an invariant of its own.
+A contact that already holds when the earlier one begins would satisfy a stage that requires both, so the
+order is an invariant of its own.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from visup.tasks.learning.relevance import CourseEvent
 from visup.tasks.learning.traces import RunTrace, Symbol
 
 TOO_EARLY_S = 2.0
-"""A later contact must not hold so long before the earlier one, seconds: outlines also meet in passing."""
+"""A later contact must not hold this long before the earlier one, seconds: shorter ones are incidental."""
 APART_S = 1.0
-"""Least time between the two contacts in every good run, seconds, for their order to be meant."""
+"""Least time between the two contacts in every good run, seconds, for their order to count."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,11 +50,11 @@ def precedences(
     lasting = [o for o in stages if all(_is_lasting(row, o[0]) for row in rows)]
     for earlier, later in pairwise(lasting):
         times = [(_at(row, earlier[0]), _at(row, later[0])) for row in rows]
-        contacts = _brought_to(earlier[0], later[0], runs)
+        contacts = _contacts_with_resting_actor(earlier[0], later[0], runs)
         apart = all(b - a > APART_S for a, b in times)
         early = any(
-            _held_before(run, contact, at)
-            for run, (at, _) in zip(runs, times, strict=True)
+            _held_before(run, contact, first_begin)
+            for run, (first_begin, _) in zip(runs, times, strict=True)
             for contact in contacts
         )
         if contacts and apart and not early:
@@ -66,16 +66,16 @@ def invariants(found: Sequence[Precedence], names: Mapping[Occurrence, str]) -> 
     """Lines of a task file.
 
     Args:
-        found: What must not come too early.
+        found: The precedences.
         names: The names of the stages.
     """
-    for one in found:
-        during = " or ".join(f"<{names[o]}>" for o in one.during)
-        for action, actors in one.contacts:
-            early = f"{action}({', '.join(actors)})"
-            # A stage may be told late, when its contact has long been seen.
-            said = f"({early} and not {action_text(one.first)})"
-            yield f"never {said} for {TOO_EARLY_S:g} s during {during}"
+    for precedence in found:
+        during = " or ".join(f"<{names[o]}>" for o in precedence.during)
+        for action, actors in precedence.contacts:
+            too_early = f"{action}({', '.join(actors)})"
+            # A stage may be reported long after its contact was observed.
+            condition = f"({too_early} and not {action_text(precedence.first)})"
+            yield f"never {condition} for {TOO_EARLY_S:g} s during {during}"
 
 
 def _in_sequence(plan: Plan) -> list[Occurrence]:
@@ -89,8 +89,10 @@ def _in_sequence(plan: Plan) -> list[Occurrence]:
     return found
 
 
-def _brought_to(earlier: Item, later: Item, runs: Sequence[RunTrace]) -> tuple[Symbol, ...]:
-    """The later contacts with the one of the earlier contact that moves less: parts may lie side by side."""
+def _contacts_with_resting_actor(
+    earlier: Item, later: Item, runs: Sequence[RunTrace]
+) -> tuple[Symbol, ...]:
+    """The later contacts with the actor of the earlier contact that moves less."""
     actors = {a for _, pair in _contacts(earlier) for a in pair}
     still = min(sorted(actors), key=lambda a: moved_s(runs, a), default="")
     return tuple(s for s in _contacts(later) if still in s[1] and s not in _contacts(earlier))
@@ -104,7 +106,12 @@ def _contacts(item: Item) -> tuple[Symbol, ...]:
 def _is_lasting(row: Sequence[CourseEvent], item: Item) -> bool:
     """Whether an event of contact occurs once in a run, was seen to begin, and lasts to its end."""
     found = [e for e in row if e.item == item]
-    return bool(_contacts(item)) and len(found) == 1 and found[0].lasts and found[0].happening.begun
+    return (
+        bool(_contacts(item))
+        and len(found) == 1
+        and found[0].lasts_to_end
+        and found[0].interval.begin_observed
+    )
 
 
 def _at(row: Sequence[CourseEvent], item: Item) -> float:
@@ -113,5 +120,11 @@ def _at(row: Sequence[CourseEvent], item: Item) -> float:
 
 def _held_before(run: RunTrace, contact: Symbol, until: float) -> bool:
     """Whether a contact held in a run for half as long as is too early, before some time."""
-    spells = [h for h in run.happenings if h.symbol == contact and h.begin < until]
-    return any(min(h.end, until) - h.begin > 0.5 * TOO_EARLY_S for h in spells)
+    earlier = [
+        interval
+        for interval in run.intervals
+        if interval.symbol == contact and interval.begin < until
+    ]
+    return any(
+        min(interval.end, until) - interval.begin > 0.5 * TOO_EARLY_S for interval in earlier
+    )

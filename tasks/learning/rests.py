@@ -22,12 +22,12 @@ LEAST_ALLOWED = 0.04
 """Lowest limit of the invariant, image diagonals per second. From masks, of 40 objects at rest in good worlds
 of fresh seeds none clearly moved faster than .01; of 15 that were rammed one moved at .05, one at
 .08 and all others at .1 or more."""
-TIMES_SEEN = 4.0
+SPEED_MARGIN = 4.0
 """The limit is also at least this many times the greatest speed in a good run."""
 
 
 @dataclass(frozen=True, slots=True)
-class Rest:
+class RestingActor:
     """An actor at rest in all good runs.
 
     Attributes:
@@ -55,7 +55,7 @@ def at_rest(run: RunTrace, actor: str) -> bool:
     return actor in run.fastest and run.fastest[actor] <= REST * run.diagonal
 
 
-def rests_of(runs: Sequence[RunTrace], actors: Collection[str]) -> Iterator[Rest]:
+def resting_actors(runs: Sequence[RunTrace], actors: Collection[str]) -> Iterator[RestingActor]:
     """The actors at rest in all runs, in alphabetical order.
 
     Args:
@@ -66,20 +66,20 @@ def rests_of(runs: Sequence[RunTrace], actors: Collection[str]) -> Iterator[Rest
     for actor in sorted(actors):
         if all(at_rest(run, actor) for run in runs):
             fastest = max(run.fastest[actor] for run in runs)
-            allowed = max(LEAST_ALLOWED * diagonal, TIMES_SEEN * fastest)
-            yield Rest(actor, fastest, 5 * ceil(allowed / 5))
+            allowed = max(LEAST_ALLOWED * diagonal, SPEED_MARGIN * fastest)
+            yield RestingActor(actor, fastest, 5 * ceil(allowed / 5))
 
 
-HALT = 0.01
-"""Lowest limit of the speed of who has come to rest, image diagonals per second: what floats bobs."""
-HALT_MARGIN = 1.5
+REST_LIMIT = 0.01
+"""Lowest speed limit of an actor that has come to rest, image diagonals per second: floating objects bob."""
+REST_MARGIN = 1.5
 """The limit is also at least this many times the greatest speed at the end of a good run."""
-SETTLED_S = 2.0
-"""Who comes to rest at the end of a good run is at rest this long before it ends, seconds."""
+END_WINDOW_S = 2.0
+"""The final rest is measured over this long before the end of a run, seconds."""
 
 
 @dataclass(frozen=True, slots=True)
-class Halt:
+class FinalRest:
     """An actor that comes to rest in the last stage of all good runs.
 
     Attributes:
@@ -98,8 +98,8 @@ class Halt:
         return f"speed({self.actor}) < {self.allowed} px/s"
 
 
-def halt_of(runs: Sequence[RunTrace], stage: Occurrence) -> Halt | None:
-    """The coming to rest of who moved more of a pair that meets in the last stage, or None.
+def final_rest_of(runs: Sequence[RunTrace], stage: Occurrence) -> FinalRest | None:
+    """The final rest of the actor that moved more of the pair that meets in the last stage, or None.
 
     Args:
         runs: Good runs.
@@ -111,13 +111,13 @@ def halt_of(runs: Sequence[RunTrace], stage: Occurrence) -> Halt | None:
     actor = max(item[1], key=lambda a: sum(run.moved_s.get(a, 0.0) for run in runs))
     rows = [_speeds(run.minds, actor) for run in runs]
     ends = [
-        v for run, row in zip(runs, rows, strict=True) for t, v in row if t > run.end - SETTLED_S
+        v for run, row in zip(runs, rows, strict=True) for t, v in row if t > run.end - END_WINDOW_S
     ]
     diagonal = min(run.diagonal for run in runs)
     if not ends or None in ends or (most := max(v or 0.0 for v in ends)) > REST * diagonal:
         return None
-    allowed = ceil(max(HALT * diagonal, HALT_MARGIN * most))
-    return Halt(actor, allowed, min(_rested_s(row, allowed) for row in rows))
+    allowed = ceil(max(REST_LIMIT * diagonal, REST_MARGIN * most))
+    return FinalRest(actor, allowed, min(_rest_duration_s(row, allowed) for row in rows))
 
 
 def _speeds(minds: Sequence[Mind], actor: str) -> list[tuple[float, float | None]]:
@@ -135,7 +135,7 @@ def _speeds(minds: Sequence[Mind], actor: str) -> list[tuple[float, float | None
     return found
 
 
-def _rested_s(speeds: Sequence[tuple[float, float | None]], allowed: float) -> float:
-    """How long a speed was below a limit at the end, seconds."""
+def _rest_duration_s(speeds: Sequence[tuple[float, float | None]], allowed: float) -> float:
+    """How long a speed was below a limit until the end, seconds."""
     fast = (t for t, v in reversed(speeds) if v is None or v >= allowed)
     return speeds[-1][0] - next(fast, speeds[0][0])

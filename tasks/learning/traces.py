@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 
@@ -18,8 +18,8 @@ Span = tuple[float, float]
 Symbol = tuple[str, tuple[str, ...]]
 """An action and its actors, those of a pair in alphabetical order."""
 
-OF_PAIRS = ("converging", "diverging", "touching", "coupled")
-BREAK_S = 1.0
+PAIR_ACTIONS = ("converging", "diverging", "touching", "coupled")
+LONGEST_BRIDGED_GAP_S = 1.0
 """Shorter gaps, seconds, are bridged: relations flicker."""
 SUSTAINED_S = 0.2
 """A speed counts when it is sustained for this long, seconds; an outline may jump."""
@@ -28,20 +28,20 @@ LEAST_S = {"converging": 0.6, "diverging": 0.6, "touching": 0.2, "coupled": 0.4,
 
 
 @dataclass(frozen=True, slots=True)
-class Happening:
+class ActionInterval:
     """An interval in which an action held.
 
     Attributes:
         symbol: The action and its actors.
         begin: Seconds.
         end: Seconds.
-        begun: Whether its beginning was observed; False for contacts present from the start.
+        begin_observed: Whether its beginning was observed; False for contacts present from the start.
     """
 
     symbol: Symbol
     begin: float
     end: float
-    begun: bool = True
+    begin_observed: bool = True
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class RunTrace:
 
     Attributes:
         name: Of the run, for messages.
-        happenings: Sorted by begin.
+        intervals: Sorted by begin.
         begin: Time of its first step, seconds.
         end: Time of its last step, seconds.
         minds: The mental model at each step.
@@ -62,7 +62,7 @@ class RunTrace:
     """
 
     name: str
-    happenings: tuple[Happening, ...]
+    intervals: tuple[ActionInterval, ...]
     begin: float
     end: float
     minds: tuple[Mind, ...] = field(repr=False, default=())
@@ -81,46 +81,57 @@ def trace_of(name: str, minds: Iterable[Mind]) -> RunTrace:
         minds: The mental model at each step, in chronological order.
     """
     history = tuple(minds)
-    spells: dict[Symbol, list[list[float]]] = {}
-    always: set[Symbol] = set()
-    gone: set[str] = set()
-    named: set[str] = set()
-    moved: dict[str, list[Span]] = {}
+    rows_of: dict[Symbol, list[list[float]]] = {}
+    from_start: set[Symbol] = set()
+    left: set[str] = set()
+    names_seen: set[str] = set()
+    motion_spans: dict[str, list[Span]] = {}
     speeds: dict[str, list[tuple[float, float]]] = {}
-    before = history[0].time if history else 0.0
+    previous_time = history[0].time if history else 0.0
     for mind in history:
         names = names_of(mind)
-        for actor, speed, moves in _motions(mind, names):
+        for actor, speed, moves in _motion_of_objects(mind, names):
             if moves:
-                moved.setdefault(actor, []).append((before, mind.time))
+                motion_spans.setdefault(actor, []).append((previous_time, mind.time))
             if speed is not None:
                 speeds.setdefault(actor, []).append((mind.time, speed))
-        before = mind.time
-        named |= set(names.values())
-        gone |= {n for i, n in names.items() if mind.objects[i].presence is Presence.LEFT}
+        previous_time = mind.time
+        names_seen |= set(names.values())
+        left |= {n for i, n in names.items() if mind.objects[i].presence is Presence.LEFT}
         for symbol, truth in _relations(mind, names):
-            if symbol[0] == "touching" and truth is Truth.TRUE and symbol not in spells:
-                always.add(symbol)
+            if symbol[0] == "touching" and truth is Truth.TRUE and symbol not in rows_of:
+                from_start.add(symbol)
             if truth is not Truth.UNKNOWN:
-                _note(spells.setdefault(symbol, []), truth, mind.time)
+                _extend_rows(rows_of.setdefault(symbol, []), truth, mind.time)
     begin, end = (history[0].time, history[-1].time) if history else (0.0, 0.0)
-    found = [h for s, rows in spells.items() for h in _happenings(s, rows, end, s not in always)]
-    found += [p for h in found if (p := _parted(h, end)) is not None]
     return RunTrace(
         name,
-        tuple(sorted(found, key=lambda h: (h.begin, h.symbol))),
+        _sorted_intervals(rows_of, from_start, end),
         begin,
         end,
         history,
-        frozenset(named - gone),
-        {actor: sum(b - a for a, b in spans) for actor, spans in moved.items()},
-        {actor: _merged(spans) for actor, spans in moved.items()},
-        {actor: _sustained(row) for actor, row in speeds.items()},
+        frozenset(names_seen - left),
+        {actor: sum(b - a for a, b in spans) for actor, spans in motion_spans.items()},
+        {actor: _merged(spans) for actor, spans in motion_spans.items()},
+        {actor: _sustained_speed(row) for actor, row in speeds.items()},
         image_diagonal(history[0].frame_size) if history else 0.0,
     )
 
 
-def _motions(mind: Mind, names: dict[int, str]) -> Iterator[tuple[str, float | None, bool]]:
+def _sorted_intervals(
+    rows_of: Mapping[Symbol, list[list[float]]], from_start: Container[Symbol], end: float
+) -> tuple[ActionInterval, ...]:
+    """The intervals of all symbols by their begin, with those of decoupling."""
+    found: list[ActionInterval] = []
+    for symbol, rows in rows_of.items():
+        found += _intervals(symbol, rows, end, symbol not in from_start)
+    found += [p for i in found if (p := _decoupling(i, end)) is not None]
+    return tuple(sorted(found, key=lambda i: (i.begin, i.symbol)))
+
+
+def _motion_of_objects(
+    mind: Mind, names: dict[int, str]
+) -> Iterator[tuple[str, float | None, bool]]:
     """Name, speed in px/s (None if not visible) and whether it is moving, of each object.
 
     The speed is 0 without clear motion: then the body rests or is partly occluded.
@@ -143,15 +154,15 @@ def _merged(spans: Sequence[Span]) -> tuple[Span, ...]:
     return tuple(found)
 
 
-def _sustained(speeds: Sequence[tuple[float, float]]) -> float:
+def _sustained_speed(speeds: Sequence[tuple[float, float]]) -> float:
     """The highest speed sustained for `SUSTAINED_S`, px/s, from (time, speed) samples."""
-    long, most, begin = SUSTAINED_S - 1e-9, 0.0, 0
-    for end, (now, _) in enumerate(speeds):
-        while begin < end and now - speeds[begin + 1][0] >= long:
+    shortest, highest, begin = SUSTAINED_S - 1e-9, 0.0, 0
+    for end, (time, _) in enumerate(speeds):
+        while begin < end and time - speeds[begin + 1][0] >= shortest:
             begin += 1
-        if now - speeds[begin][0] >= long:
-            most = max(most, min(speed for _, speed in speeds[begin : end + 1]))
-    return most
+        if time - speeds[begin][0] >= shortest:
+            highest = max(highest, min(speed for _, speed in speeds[begin : end + 1]))
+    return highest
 
 
 def names_of(mind: Mind) -> dict[int, str]:
@@ -168,34 +179,37 @@ def _relations(mind: Mind, names: dict[int, str]) -> Iterator[tuple[Symbol, Trut
     relations = RelationLookup(mind)
     ordered = sorted(names, key=names.__getitem__)
     for a, b in combinations(ordered, 2):
-        for action in OF_PAIRS:
+        for action in PAIR_ACTIONS:
             yield (action, (names[a], names[b])), relations.find(action, (a, b)).truth
 
 
-def _note(rows: list[list[float]], truth: Truth, now: float) -> None:
+def _extend_rows(rows: list[list[float]], truth: Truth, now: float) -> None:
     """Update [begin, end] rows; an open interval has no end yet."""
-    going = bool(rows) and len(rows[-1]) == 1
-    if truth is Truth.TRUE and not going:
-        if rows and now - rows[-1][1] < BREAK_S:
+    is_open = bool(rows) and len(rows[-1]) == 1
+    if truth is Truth.TRUE and not is_open:
+        if rows and now - rows[-1][1] < LONGEST_BRIDGED_GAP_S:
             rows[-1].pop()
         else:
             rows.append([now])
-    elif truth is Truth.FALSE and going:
+    elif truth is Truth.FALSE and is_open:
         rows[-1].append(now)
 
 
-def _happenings(
+def _intervals(
     symbol: Symbol, rows: list[list[float]], end: float, begun: bool
-) -> Iterator[Happening]:
-    """The intervals of a symbol that are long enough; `begun` applies to the first, later ones have begun."""
+) -> Iterator[ActionInterval]:
+    """The intervals of a symbol that are long enough.
+
+    `begun` says whether the beginning of the first was observed; that of later ones always was.
+    """
     for number, row in enumerate(rows):
         begin, until = row[0], row[1] if len(row) > 1 else end
         if until - begin >= LEAST_S[symbol[0]]:
-            yield Happening(symbol, begin, until, begun or number > 0)
+            yield ActionInterval(symbol, begin, until, begun or number > 0)
 
 
-def _parted(coupling: Happening, end: float) -> Happening | None:
+def _decoupling(coupling: ActionInterval, end: float) -> ActionInterval | None:
     """The end of a coupling as an interval of its own."""
     if coupling.symbol[0] != "coupled" or end - coupling.end < LEAST_S["decoupled"]:
         return None
-    return Happening(("decoupled", coupling.symbol[1]), coupling.end, end)
+    return ActionInterval(("decoupled", coupling.symbol[1]), coupling.end, end)

@@ -9,7 +9,7 @@ import pytest
 
 from tests.cli import Call
 from tests.commands.test_cli import visup
-from tests.tasks.learning.test_learning import ARM, NAMES, PART, picked
+from tests.tasks.learning.test_learning import ARM, NAMES, PART, pick_run
 from visup.agent import Mind
 from visup.runs import learning_runs
 from visup.tasks.learning.traces import RunTrace
@@ -21,7 +21,9 @@ assert {ARM, PART} <= set(NAMES)
 @pytest.fixture
 def runs(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Runs `1` to `3` that went well and `spoilt`, in the place of journals."""
-    known = {str(k): picked(str(k), k) for k in (1, 2, 3)} | {"spoilt": picked("spoilt", 9, "drop")}
+    known = {str(k): pick_run(str(k), k) for k in (1, 2, 3)} | {
+        "spoilt": pick_run("spoilt", 9, "drop")
+    }
 
     def trace(run: Path) -> RunTrace:
         return known[run.name]

@@ -8,57 +8,64 @@ from itertools import combinations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from visup.tasks.learning.alignment import aligned, longest_common
+from visup.tasks.learning.alignment import longest_common_subsequence, with_common_counts
 from visup.tasks.learning.relevance import CourseEvent
-from visup.tasks.learning.traces import Happening
+from visup.tasks.learning.traces import ActionInterval
 
 WORDS = st.lists(st.text("abcd", max_size=7), min_size=1, max_size=4)
 
 
-def row(word: str) -> list[CourseEvent]:
+def events_of(word: str) -> list[CourseEvent]:
     """Events named by letters, a second apart."""
     return [
-        CourseEvent(Happening((c, ("x", "y")), float(k), k + 1.0), float(k))
+        CourseEvent(ActionInterval((c, ("x", "y")), float(k), k + 1.0), float(k))
         for k, c in enumerate(word)
     ]
 
 
-def letters(events: list[CourseEvent]) -> str:
+def actions_of(events: list[CourseEvent]) -> str:
     return "".join(e.symbol[0] for e in events)
 
 
 @given(WORDS)
-def test_what_all_have_is_there_as_often_in_all_and_nothing_else_is_lost(words: list[str]) -> None:
-    found = [letters(r) for r in aligned([row(w) for w in words])]
-    for word, left in zip(words, found, strict=True):
+def test_common_items_are_reduced_to_their_least_count_and_others_retained(
+    words: list[str],
+) -> None:
+    found = [actions_of(r) for r in with_common_counts([events_of(w) for w in words])]
+    for word, reduced in zip(words, found, strict=True):
         at = iter(word)
-        assert all(c in at for c in left)  # in its order
+        assert all(c in at for c in reduced)  # in its order
         for c in set(word):
             least = min(Counter(w)[c] for w in words)
-            assert left.count(c) == (least or word.count(c))
+            assert reduced.count(c) == (least or word.count(c))
 
 
 @given(st.text("abc", max_size=6), st.text("abc", max_size=6))
-def test_the_longest_common_course_is_that_of_trying_all(one: str, other: str) -> None:
-    places = longest_common(row_items(one), row_items(other))
+def test_longest_common_subsequence_equals_brute_force(one: str, other: str) -> None:
+    places = longest_common_subsequence(items_of(one), items_of(other))
     assert places == sorted(set(places))
-    every = (len(p) for n in range(len(one) + 1) for p in combinations(one, n) if within(p, other))
+    every = (
+        len(p)
+        for n in range(len(one) + 1)
+        for p in combinations(one, n)
+        if is_subsequence(p, other)
+    )
     assert len(places) == max(every)
-    assert within(tuple(one[k] for k in places), other)
+    assert is_subsequence(tuple(one[k] for k in places), other)
 
 
-def row_items(word: str) -> list[tuple[str, tuple[str, ...]]]:
+def items_of(word: str) -> list[tuple[str, tuple[str, ...]]]:
     return [(c, ("x", "y")) for c in word]
 
 
-def within(part: tuple[str, ...], word: str) -> bool:
+def is_subsequence(part: tuple[str, ...], word: str) -> bool:
     at = iter(word)
     return all(c in at for c in part)
 
 
-def test_a_grasp_that_is_lost_from_sight_for_a_moment_is_the_grasp_that_all_have() -> None:
+def test_a_grasp_detected_twice_counts_once() -> None:
     """a approach, b grasp, c place, d let go: the one that comes before the placing is none."""
-    plain, broken = row("abcd"), row("abdabcd")
-    found = aligned([plain, broken])[1]
-    assert letters(found) == "abcd"
+    plain, broken = events_of("abcd"), events_of("abdabcd")
+    found = with_common_counts([plain, broken])[1]
+    assert actions_of(found) == "abcd"
     assert found[-1].at == 6.0

@@ -11,18 +11,18 @@ from tests.tasks.scripted import Spell
 from visup.agent import Verdict
 from visup.tasks import parse_task
 from visup.tasks.analysis.judging import judged
-from visup.tasks.learning.bodies import as_one_body
+from visup.tasks.learning.bodies import with_resting_bodies_merged
 from visup.tasks.learning.induction import learn_task
-from visup.tasks.learning.order import Either
+from visup.tasks.learning.order import Disjunction
 from visup.tasks.learning.relevance import CourseEvent
-from visup.tasks.learning.traces import Happening, RunTrace
+from visup.tasks.learning.traces import ActionInterval, RunTrace
 
-Row = list[CourseEvent]
+Events = list[CourseEvent]
 
 
 def contact(one: str, other: str, begin: float, end: float = 20.0) -> CourseEvent:
     pair = tuple(sorted((one, other)))
-    return CourseEvent(Happening(("touching", pair), begin, end), begin, end == 20.0)
+    return CourseEvent(ActionInterval(("touching", pair), begin, end), begin, end == 20.0)
 
 
 def trace(**moved_s: float) -> RunTrace:
@@ -33,11 +33,11 @@ RUNS = [trace(base=0.0, block=3.0, cap=3.0)] * 2
 FIRST = contact("base", "block", 4.0)
 
 
-def merged(*rows: Sequence[CourseEvent]) -> list[Row]:
-    return as_one_body(rows, RUNS[: len(rows)])
+def merged(*rows: Sequence[CourseEvent]) -> list[Events]:
+    return with_resting_bodies_merged(rows, RUNS[: len(rows)])
 
 
-def test_the_contact_with_the_part_that_moves_less_stands_for_both_where_all_runs_have_it() -> None:
+def test_two_contacts_merge_into_the_one_with_the_part_that_moves_less() -> None:
     rows = [
         [FIRST, contact("base", "cap", 8.0), contact("block", "cap", 8.1)],
         [FIRST, contact("block", "cap", 8.0, 9.0), contact("base", "cap", 8.4)],
@@ -46,29 +46,29 @@ def test_the_contact_with_the_part_that_moves_less_stands_for_both_where_all_run
         assert [e.item for e in row] == [FIRST.symbol, ("touching", ("base", "cap"))]
 
 
-def test_either_contact_is_evidence_where_each_is_missed_in_some_run() -> None:
+def test_either_contact_is_evidence_if_each_is_missing_in_some_run() -> None:
     first, second = merged(
         [FIRST, contact("base", "cap", 8.0)], [FIRST, contact("block", "cap", 9.0)]
     )
-    either = Either((("touching", ("base", "cap")), ("touching", ("block", "cap"))))
+    either = Disjunction((("touching", ("base", "cap")), ("touching", ("block", "cap"))))
     assert [e.item for e in first] == [e.item for e in second] == [FIRST.symbol, either]
     assert (first[1].at, second[1].at) == (8.0, 9.0)
 
 
-def test_contacts_stay_apart_where_the_two_do_not_stay_together() -> None:
+def test_contacts_are_not_merged_if_the_two_parts_separate() -> None:
     first = contact("base", "block", 4.0, 6.0)
     row = [first, contact("base", "cap", 8.0), contact("block", "cap", 9.0)]
     assert merged(row) == [row]
 
 
-def test_a_contact_in_passing_before_the_two_have_met_does_not_count() -> None:
+def test_an_incidental_contact_before_the_two_parts_meet_is_dropped() -> None:
     passing, long = contact("block", "cap", 3.6, 4.2), contact("block", "cap", 2.0, 3.6)
     kept = [FIRST, contact("base", "cap", 8.0)]
     assert merged([passing, *kept]) == [kept]
     assert merged([long, *kept]) == [[long, *kept]]
 
 
-def assembled(name: str, seed: int, order: Sequence[int] = (PART, CRATE)) -> RunTrace:
+def assembly_run(name: str, seed: int, order: Sequence[int] = (PART, CRATE)) -> RunTrace:
     """Part and crate are put onto the tray, one after the other."""
     rng, at, spells = Random(seed), 1.0, list[Spell]()
     for thing in order:
@@ -83,11 +83,11 @@ def assembled(name: str, seed: int, order: Sequence[int] = (PART, CRATE)) -> Run
     return replace(run_of(name, spells), moved_s={"crate": 3.0, "part": 3.0, "tray": 0.0})
 
 
-def test_the_order_of_parts_that_are_put_together_is_kept() -> None:
-    learned = learn_task("assemble", [assembled(f"good{k}", k) for k in range(3)])
+def test_the_order_of_assembly_is_learned() -> None:
+    learned = learn_task("assemble", [assembly_run(f"good{k}", k) for k in range(3)])
     task = parse_task(learned.text)
     assert (
         "never (touching(crate, tray) and not touching(part, tray)) for 2 s during" in learned.text
     )
-    assert judged(task, assembled("x", 10).minds).verdict is Verdict.SUCCEEDED
-    assert judged(task, assembled("x", 11, (CRATE, PART)).minds).verdict is not Verdict.SUCCEEDED
+    assert judged(task, assembly_run("x", 10).minds).verdict is Verdict.SUCCEEDED
+    assert judged(task, assembly_run("x", 11, (CRATE, PART)).minds).verdict is not Verdict.SUCCEEDED

@@ -20,12 +20,12 @@ from visup.tasks.analysis.languages import difference
 from visup.tasks.learning.fitting import fitted_amounts, with_amounts
 from visup.tasks.learning.induction import learn_task
 from visup.tasks.learning.order import (
-    Free,
     Loop,
     Series,
+    Unordered,
+    frequent_occurrences,
     leaves_of,
     plan_of,
-    shared,
     with_loops,
 )
 from visup.tasks.learning.traces import RunTrace, trace_of
@@ -51,7 +51,7 @@ def run_of(name: str, spells: Sequence[Spell], until: float = 40.0) -> RunTrace:
     return trace_of(name, minds)
 
 
-def picked(name: str, seed: int, spoilt: str = "") -> RunTrace:
+def pick_run(name: str, seed: int, spoilt: str = "") -> RunTrace:
     """The arm comes to the part, couples, brings it to the tray, lets go."""
     rng = Random(seed)
     t1, t2, t3, t4 = (sum(rng.uniform(2.5, 5.0) for _ in range(k)) for k in (1, 2, 3, 4))
@@ -78,22 +78,22 @@ def picked(name: str, seed: int, spoilt: str = "") -> RunTrace:
 
 @cache
 def good_runs() -> list[RunTrace]:
-    return [picked(f"good{k}", k) for k in range(3)]
+    return [pick_run(f"good{k}", k) for k in range(3)]
 
 
 @cache
 def bad_runs() -> list[RunTrace]:
-    return [picked("drop", 50, "drop"), picked("bump", 51, "bump")]
+    return [pick_run("drop", 50, "drop"), pick_run("bump", 51, "bump")]
 
 
-def test_a_task_learned_from_three_runs_accepts_others_and_refuses_bad_ones() -> None:
+def test_a_task_learned_from_three_runs_accepts_good_runs_and_refuses_bad_ones() -> None:
     learned = learn_task("bring", good_runs(), bad_runs())
     task = parse_task(learned.text)
     assert set(learned.good.values()) == {Verdict.SUCCEEDED}
-    others = [judged(task, picked("x", k).minds).verdict for k in range(10, 16)]
+    others = [judged(task, pick_run("x", k).minds).verdict for k in range(10, 16)]
     assert others.count(Verdict.SUCCEEDED) == 6
     kinds = ("never", "drop", "bump")
-    bad = [judged(task, picked("x", 30 + k, kinds[k % 3]).minds).verdict for k in range(6)]
+    bad = [judged(task, pick_run("x", 30 + k, kinds[k % 3]).minds).verdict for k in range(6)]
     assert Verdict.SUCCEEDED not in bad
     assert all(v is not Verdict.SUCCEEDED for v in learned.bad.values())
     assert "never touching(arm, crate)" in learned.text
@@ -101,7 +101,7 @@ def test_a_task_learned_from_three_runs_accepts_others_and_refuses_bad_ones() ->
     assert "crate, tray" not in learned.text  # some runs had it only
 
 
-def test_what_was_learned_differs_little_from_what_one_writes() -> None:
+def test_a_learned_task_resembles_a_handwritten_one() -> None:
     learned = parse_task(learn_task("bring", good_runs()).text)
     written = parse_task(
         "<bring> ::= <approach> <grasp> <carry> <place> <release>\n"
@@ -115,7 +115,7 @@ def test_what_was_learned_differs_little_from_what_one_writes() -> None:
     assert all(len(c) >= 4 for c in courses)
 
 
-def wiped(name: str, times: int, every_s: float = 3.0, seed: int = 0) -> RunTrace:
+def wiping_run(name: str, times: int, every_s: float = 3.0, seed: int = 0) -> RunTrace:
     """The arm touches the tray again and again, then holds the part."""
     rng, at, spells = Random(seed + times), 2.0, []
     for _ in range(times):
@@ -125,23 +125,23 @@ def wiped(name: str, times: int, every_s: float = 3.0, seed: int = 0) -> RunTrac
     return run_of(name, spells, at + 8.0)
 
 
-def test_what_keeps_a_rhythm_however_often_is_learned_as_a_period() -> None:
-    learned = learn_task("wipe", [wiped(f"good{n}", n) for n in (5, 7, 6)])
+def test_a_regular_repetition_is_learned_as_a_period() -> None:
+    learned = learn_task("wipe", [wiping_run(f"good{n}", n) for n in (5, 7, 6)])
     assert "touching(arm, tray) every 1.5 s to 5.5 s  # every 2." in learned.text
     assert set(learned.good.values()) == {Verdict.SUCCEEDED}
     task = parse_task(learned.text)
-    assert judged(task, wiped("often", 9).minds).verdict is Verdict.SUCCEEDED
-    assert judged(task, wiped("slow", 5, 8.0).minds).verdict is not Verdict.SUCCEEDED
+    assert judged(task, wiping_run("often", 9).minds).verdict is Verdict.SUCCEEDED
+    assert judged(task, wiping_run("slow", 5, 8.0).minds).verdict is not Verdict.SUCCEEDED
 
 
-def test_what_is_done_so_often_each_time_or_out_of_time_is_no_period() -> None:
-    always_five = learn_task("wipe", [wiped(f"good{n}", 5, seed=n) for n in range(3)])
-    uneven = learn_task("wipe", [wiped(f"good{n}", n, 2.5 * n - 9) for n in (5, 7, 6)])
+def test_a_fixed_count_or_an_irregular_repetition_is_not_a_period() -> None:
+    always_five = learn_task("wipe", [wiping_run(f"good{n}", 5, seed=n) for n in range(3)])
+    uneven = learn_task("wipe", [wiping_run(f"good{n}", n, 2.5 * n - 9) for n in (5, 7, 6)])
     assert " every " not in always_five.text.replace("# every", "")
     assert " every " not in uneven.text
 
 
-def test_runs_with_nothing_in_common_teach_nothing() -> None:
+def test_runs_with_nothing_in_common_are_an_error() -> None:
     with pytest.raises(TaskError, match="nothing in common"):
         learn_task("t", [run_of("idle", ())])
 
@@ -149,13 +149,13 @@ def test_runs_with_nothing_in_common_teach_nothing() -> None:
 A, B, C, D = (("touching", (n, "top")) for n in "abcd")
 
 
-def test_what_comes_in_either_order_is_free_and_the_rest_is_not() -> None:
+def test_only_items_seen_in_both_orders_are_unordered() -> None:
     words = [(A, B, C, D), (A, C, B, D)]
-    plan = plan_of(words, shared(words, 1.0))
-    assert plan == Series(((A, 0), Free(((B, 0), (C, 0))), (D, 0)))
+    plan = plan_of(words, frequent_occurrences(words, 1.0))
+    assert plan == Series(((A, 0), Unordered(((B, 0), (C, 0))), (D, 0)))
 
 
-def test_what_repeats_is_a_loop_when_that_is_shorter() -> None:
+def test_repeats_become_a_loop_if_that_is_shorter() -> None:
     words, times = with_loops([(A, B, C, B, C, B, C, D), (A, B, C, B, C, D)])
     loop = Loop((B, C))
     assert words == [(A, loop, D), (A, loop, D)]
@@ -165,11 +165,11 @@ def test_what_repeats_is_a_loop_when_that_is_shorter() -> None:
 
 
 @given(st.lists(st.permutations([A, B, C, D]), min_size=1, max_size=5))
-def test_a_plan_holds_each_thing_once_and_keeps_every_order_that_all_share(
+def test_a_plan_has_each_occurrence_once_and_every_common_order(
     orders: list[list[object]],
 ) -> None:
     words = [tuple(o) for o in orders]
-    plan = plan_of(words, shared(words, 1.0))  # type: ignore[arg-type]
+    plan = plan_of(words, frequent_occurrences(words, 1.0))  # type: ignore[arg-type]
     found = [o[0] for o in leaves_of(plan)]
     assert set(found) == {A, B, C, D}
     assert len(found) == 4
@@ -187,7 +187,7 @@ TEXT = """# how a part is brought
 """
 
 
-def test_durations_are_fitted_in_their_places_and_all_else_stays() -> None:
+def test_fitting_changes_only_durations() -> None:
     task = parse_task(TEXT)
     runs = [judged(task, run.minds) for run in good_runs()]
     fitted = fitted_amounts(task, runs)
@@ -199,7 +199,7 @@ def test_durations_are_fitted_in_their_places_and_all_else_stays() -> None:
     assert all(judged(parse_task(text), r.minds).verdict is Verdict.SUCCEEDED for r in good_runs())
 
 
-def test_coverage_names_what_no_run_went_through() -> None:
+def test_coverage_names_stages_that_no_run_reached() -> None:
     task = parse_task(
         "<t> ::= <reach> (<grasp> | <miss>)\n<reach> ::= converging(arm, part)\n"
         "<grasp> ::= coupled(arm, part) decoupled(arm, part)\n<miss> ::= diverging(arm, part) for 30 s"
@@ -232,13 +232,13 @@ UNLIKE = [
 
 
 @pytest.mark.parametrize(("one", "two"), SAME)
-def test_tasks_of_one_language_do_not_differ_however_they_are_written(one: str, two: str) -> None:
+def test_tasks_with_the_same_language_do_not_differ(one: str, two: str) -> None:
     found = difference(parse_task(one), parse_task(two))
     assert (found.only_first, found.only_second, found.whole) == (None, None, True)
 
 
 @pytest.mark.parametrize(("one", "two", "first", "second"), UNLIKE)
-def test_the_shortest_course_that_one_alone_allows_is_told(
+def test_the_shortest_course_of_only_one_task_is_reported(
     one: str, two: str, first: str, second: str | None
 ) -> None:
     found = difference(parse_task(one), parse_task(two))
@@ -249,7 +249,7 @@ def test_the_shortest_course_that_one_alone_allows_is_told(
         assert f"only B allows: {second}; A does not" in lines
 
 
-def test_times_and_invariants_that_differ_are_told() -> None:
+def test_different_times_and_invariants_are_reported() -> None:
     one = parse_task("<t> ::= touching(a, b) within 5 s\nnever touching(a, c)\nactor c is red")
     two = parse_task("<t> ::= touching(a, b) within 9 s")
     said = "\n".join(difference(one, two).lines("A", "B"))
@@ -269,14 +269,14 @@ def test_times_and_invariants_that_differ_are_told() -> None:
         ),
     ],
 )
-def test_conditions_and_places_that_differ_are_told(more: str, what: str) -> None:
+def test_different_conditions_and_places_are_reported(more: str, what: str) -> None:
     one, two = parse_task("<t> ::= touching(a, b)"), parse_task("<t> ::= touching(a, b)" + more)
     found = difference(one, two)
     assert found
     assert any(what in line for line in found.lines("A", "B"))
 
 
-def test_the_actions_that_one_alone_asks_for_are_named() -> None:
+def test_actions_of_only_one_task_are_named() -> None:
     one = parse_task("<t> ::= (touching(a, b) & moving(b)) fails when apart(b, a)")
     two = parse_task("<t> ::= touching(b, a) coupled(a, b)")
     named = [line for line in difference(one, two).lines("A", "B") if line.endswith("(actions)")]
@@ -297,7 +297,7 @@ PAUSE = "pauses when touching(part, tray)"
         (f"(touching(arm, part) for 4 s {PAUSE}) within 90 s", "13.8"),
     ],
 )
-def test_pauses_count_for_a_time_only_where_they_stand_inside_it(course: str, seconds: str) -> None:
+def test_pauses_count_towards_a_duration_only_inside_its_clause(course: str, seconds: str) -> None:
     task = parse_task(f"<hold> ::= {course}")
     hold, pause = (
         Spell("touching", 1.0, 30.0, (ARM, PART)),
