@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from visup.agent.model.errors import OutputError
 
-MAGIC = b"VISUPST2"
+MAGIC = b"VISUPST3"
 PACKAGE = "visup."
 _HEAD = struct.Struct(
     "<8sQII"

@@ -21,7 +21,7 @@ from visup.agent import Mind
 from visup.agent.model.fast_replace import replace
 from visup.agent.model.memory import MemoryKey
 from visup.rules.geometry.regions import image_diagonal
-from visup.rules.predicates.motion import CLEAR, MOVING_SIGMAS
+from visup.rules.predicates.motion import CLEAR_MOTION_SIGMA, MOVING_SIGMAS
 from visup.rules.relations.reasoner import kinematics
 
 
@@ -137,7 +137,7 @@ def _moved_bodies(
     """The motions of all bodies updated by one step; carriers are not determined yet."""
     now, dt = kinematics(mind), 0.0 if memory.time is None else mind.time - memory.time
     diagonal = image_diagonal(mind.frame_size)
-    least, unclear = settings.speed * diagonal, CLEAR * diagonal
+    least, unclear = settings.speed * diagonal, CLEAR_MOTION_SIGMA * diagonal
     found: dict[int, BodyMotion] = {}
     rows = zip(now.ids, now.speed.tolist(), now.velocity_sigma.tolist(), now.velocity, strict=True)
     for number, speed, sigma, velocity in rows:

@@ -38,11 +38,11 @@ class Predicate:
     """`converging(a, b)`: a relation or a fact."""
 
     name: str
-    words: tuple[str, ...]
+    arguments: tuple[str, ...]
     span: Span = field(default=NOWHERE, compare=False, repr=False)
 
     def __str__(self) -> str:
-        return f"{self.name}({', '.join(self.words)})"
+        return f"{self.name}({', '.join(self.arguments)})"
 
 
 @dataclass(frozen=True, slots=True)

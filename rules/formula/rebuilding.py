@@ -66,7 +66,7 @@ def substituted(node: Node, names: Mapping[str, str]) -> Node:
 
     def change(part: Node) -> Node | None:
         if isinstance(part, Predicate | Measure):
-            return replace(part, words=tuple(names.get(w, w) for w in part.words))
+            return replace(part, arguments=tuple(names.get(w, w) for w in part.arguments))
         return None
 
     return rebuilt(node, change)

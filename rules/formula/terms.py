@@ -18,11 +18,11 @@ class Measure:
     """`time_to_contact(a, b)`: a quantity of objects."""
 
     name: str
-    words: tuple[str, ...] = ()
+    arguments: tuple[str, ...] = ()
     span: Span = field(default=NOWHERE, compare=False, repr=False)
 
     def __str__(self) -> str:
-        return f"{self.name}({', '.join(self.words)})"
+        return f"{self.name}({', '.join(self.arguments)})"
 
 
 @dataclass(frozen=True, slots=True)

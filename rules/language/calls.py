@@ -11,7 +11,13 @@ from visup.rules.language.diagnostics import listed, nearest
 from visup.rules.language.dimensions import example_amount
 from visup.rules.language.synonyms import negated_synonym, synonym
 from visup.rules.language.transform import Fault
-from visup.rules.predicates.arguments import EXAMPLES, arranged, distinct, fits, known_of
+from visup.rules.predicates.arguments import (
+    EXAMPLES,
+    allowed_words,
+    fits,
+    rearranged_call,
+    with_distinct_words,
+)
 from visup.rules.predicates.vocabulary import Vocabulary
 
 Call = Predicate | Measure
@@ -28,68 +34,68 @@ def check_call(call: Call, vocabulary: Vocabulary, scope: tuple[str, ...]) -> It
         vocabulary: What there is.
         scope: Variables of the rule that are known here.
     """
-    table = vocabulary.words if isinstance(call, Predicate) else vocabulary.quantities
+    table = vocabulary.predicates if isinstance(call, Predicate) else vocabulary.quantities
     if call.name not in table:
         yield _unknown(call, vocabulary, scope)
         return
-    takes = table[call.name].takes
-    hint = f"write `{arranged(call.name, call.words, takes, scope)}`"
-    if len(takes) != len(call.words):
-        what = f"'{call.name}' takes {len(takes)} argument(s), not {len(call.words)}"
-        yield call.span, what, f"{call.name}({', '.join(takes)})", hint
+    kinds = table[call.name].argument_kinds
+    hint = f"write `{rearranged_call(call.name, call.arguments, kinds, scope)}`"
+    if len(kinds) != len(call.arguments):
+        what = f"'{call.name}' takes {len(kinds)} argument(s), not {len(call.arguments)}"
+        yield call.span, what, f"{call.name}({', '.join(kinds)})", hint
         return
-    for wanted, word in zip(takes, call.words, strict=True):
-        for span, what, expected, own in _argument(call, wanted, word, scope):
-            sorted_out = any(fits(wanted, w, scope) for w in call.words)
+    for kind, word in zip(kinds, call.arguments, strict=True):
+        for span, what, expected, own in _argument(call, kind, word, scope):
+            sorted_out = any(fits(kind, w, scope) for w in call.arguments)
             yield span, what, expected, hint if sorted_out else own
-    names = [w for w, t in zip(call.words, takes, strict=True) if t == "object"]
+    names = [w for w, t in zip(call.arguments, kinds, strict=True) if t == "object"]
     if len(set(names)) < len(names):
-        hint = f"write `{call.name}({', '.join(distinct(call.words, scope))})`"
+        hint = f"write `{call.name}({', '.join(with_distinct_words(call.arguments, scope))})`"
         what = f"'{call.name}' is given the same object twice"
         yield call.span, what, "two different objects", hint
 
 
 def _unknown(call: Call, vocabulary: Vocabulary, scope: tuple[str, ...]) -> Fault:
-    words, quantities = vocabulary.words, vocabulary.quantities
+    predicates, quantities = vocabulary.predicates, vocabulary.quantities
     fact = isinstance(call, Predicate)
-    table = words if fact else quantities
+    table = predicates if fact else quantities
     kind = "relation or fact" if fact else "quantity"
     hint = did_you_mean(synonym(call.name, table) or call.name, table)
-    if fact and call.name in _KNOWN and len(call.words) == 1:
-        meant = "identified" if call.words[0] in scope else "signal_known"
-        hint = f"write `{meant}({call.words[0]})`"
-    elif fact and (other := negated_synonym(call.name, call.words, words)) is not None:
+    if fact and call.name in _KNOWN and len(call.arguments) == 1:
+        meant = "identified" if call.arguments[0] in scope else "signal_known"
+        hint = f"write `{meant}({call.arguments[0]})`"
+    elif fact and (other := negated_synonym(call.name, call.arguments, predicates)) is not None:
         hint = f"write `{other}`"
-    elif call.name in (quantities if fact else words):
-        hint = _compared(call, vocabulary) if fact else "it is true or false"
-    elif not fact and hint is not None and "'objects'" in hint and len(call.words) == 1:
-        hint = f"write `objects_named({call.words[0]})`"
-    elif call.name in scope and not call.words:
+    elif call.name in (quantities if fact else predicates):
+        hint = _comparison_hint(call, vocabulary) if fact else "it is true or false"
+    elif not fact and hint is not None and "'objects'" in hint and len(call.arguments) == 1:
+        hint = f"write `objects_named({call.arguments[0]})`"
+    elif call.name in scope and not call.arguments:
         hint = f"write `seen({call.name})` in place of `{call.name}`"
-    elif fact and hint is None and not call.words and len(call.name) > SHORT_NAME:
+    elif fact and hint is None and not call.arguments and len(call.name) > SHORT_NAME:
         hint = f"write `signal_on({call.name})` in place of `{call.name}`"
     return call.span, f"there is no {kind} '{call.name}'", nearest(call.name, table), hint
 
 
-def _compared(call: Call, vocabulary: Vocabulary) -> str:
+def _comparison_hint(call: Call, vocabulary: Vocabulary) -> str:
     """A suggestion for a quantity used as a condition."""
-    said = f"{call.name}({', '.join(call.words)})"
+    quantity_text = f"{call.name}({', '.join(call.arguments)})"
     if call.name == "signal":
-        return f"write `signal_on({', '.join(call.words)})` in place of `{said}`"
-    measured = Measure(call.name, call.words, call.span)
+        return f"write `signal_on({', '.join(call.arguments)})` in place of `{quantity_text}`"
+    measured = Measure(call.name, call.arguments, call.span)
     amount = example_amount(Comparison(measured, "<", measured), vocabulary)
-    return f"compare it with a number; write `{said} < {amount}` in place of `{said}`"
+    return f"compare it with a number; write `{quantity_text} < {amount}` in place of `{quantity_text}`"
 
 
-def _argument(call: Call, wanted: str, word: str, scope: tuple[str, ...]) -> Iterator[Fault]:
-    known = known_of(wanted, word, scope)
+def _argument(call: Call, kind: str, word: str, scope: tuple[str, ...]) -> Iterator[Fault]:
+    known = allowed_words(kind, word, scope)
     if word not in known:
-        what = f"'{word}' is not a {'variable of the rule' if wanted == 'object' else wanted}"
-        near = closest(word, known) or next((k for k in known if k not in call.words), None)
+        what = f"'{word}' is not a {'variable of the rule' if kind == 'object' else kind}"
+        near = closest(word, known) or next((k for k in known if k not in call.arguments), None)
         hint = None if near is None else f"write `{near}` in place of `{word}`"
         yield call.span, what, listed(known), hint
-    elif wanted != "object" and word in scope:
-        what = f"'{word}' is a variable of the rule, but '{call.name}' takes a {wanted}"
-        other = EXAMPLES.get(wanted)
+    elif kind != "object" and word in scope:
+        what = f"'{word}' is a variable of the rule, but '{call.name}' takes a {kind}"
+        other = EXAMPLES.get(kind)
         hint = None if other is None else f"write `{other}` in place of `{word}`"
         yield call.span, what, None, hint or "rename the variable"

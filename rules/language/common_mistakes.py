@@ -117,13 +117,13 @@ def _of_signal(match: re.Match[str]) -> str:
 
 def _behind(match: re.Match[str]) -> str:
     """An argument that stands behind its bracket."""
-    takes = RULES.words[match[1]].takes if match[1] in RULES.words else ()
-    return f"{match[1]}({match[2]}, {match[3]})" if len(takes) == 2 else match[0]
+    kinds = RULES.predicates[match[1]].argument_kinds if match[1] in RULES.predicates else ()
+    return f"{match[1]}({match[2]}, {match[3]})" if len(kinds) == 2 else match[0]
 
 
 def _pronoun(match: re.Match[str]) -> str:
     """What somebody or nobody does with an object."""
-    verb = synonym(match["verb"], RULES.words) or closest(match["verb"], RULES.words)
+    verb = synonym(match["verb"], RULES.predicates) or closest(match["verb"], RULES.predicates)
     said = f"(exists other: {verb}(other, {match['what']}))"
     return f"not {said}" if match["who"].casefold().startswith("no") else said
 
@@ -144,7 +144,9 @@ def _counted(match: re.Match[str]) -> str:
 def _being(match: re.Match[str]) -> str:
     """`a is arm`: an object of a name, unless it is a word of the language."""
     name = match["name"]
-    known = name in KEYWORDS or name in RULES.words or synonym(name, RULES.words) is not None
+    known = (
+        name in KEYWORDS or name in RULES.predicates or synonym(name, RULES.predicates) is not None
+    )
     said = f"named({match['what']}, {name})"
     return match[0] if known or name == "another" else f"not {said}" if match["no"] else said
 

@@ -57,7 +57,7 @@ _HEAD = re.compile(r"\A[^\n\"]*?\w[ ]*[(\[]([^)\n]*)[)\]]?[ ]*:[^\n]*")
 _ARGUMENTS = re.compile(r"\(([^()\n]*)\)|\{(\w+)\}")
 _NAMES = re.compile(r"(?<![\w\"'.])[A-Za-z_]\w*")
 _UNITS = tuple(u for u in Unit if u)
-_VOCABULARY = (*RULES.words, *RULES.quantities, *FUNCTIONS)
+_VOCABULARY = (*RULES.predicates, *RULES.quantities, *FUNCTIONS)
 
 
 def edit_costs(parser: Lark, start: str, text: str) -> EditCosts:
@@ -143,14 +143,14 @@ def _meant(
 def _calls_meant(said: Sequence[str], variables: Sequence[str]) -> Iterator[Replacement]:
     """Calls written as words without brackets, or missing before what follows."""
     first, follows = said[0], said[1] if len(said) > 1 else ""
-    if first in _TAKES and follows != "(":
-        takes = _TAKES[first]
-        given = [w for w in said[1 : len(takes) + 1] if w.isidentifier() and w not in KEYWORDS]
+    if first in _ARGUMENT_KINDS and follows != "(":
+        kinds = _ARGUMENT_KINDS[first]
+        given = [w for w in said[1 : len(kinds) + 1] if w.isidentifier() and w not in KEYWORDS]
         for words in (given, list(variables)):
-            if takes and len(words) >= len(takes):
-                call, read = (first, *words[: len(takes)]), len(takes) if words is given else 0
-                yield Replacement(1 + read, terminals_of_call(len(takes)), called(call), LIKELY)
-    if first.isidentifier() and first not in _TAKES and follows in ("<", ">", "<=", ">="):
+            if kinds and len(words) >= len(kinds):
+                call, read = (first, *words[: len(kinds)]), len(kinds) if words is given else 0
+                yield Replacement(1 + read, terminals_of_call(len(kinds)), called(call), LIKELY)
+    if first.isidentifier() and first not in _ARGUMENT_KINDS and follows in ("<", ">", "<=", ">="):
         yield Replacement(1, terminals_of_call(1), f"signal({first})", GUESS)
     if first in ("say", "hold", "cooldown", "unless") and variables:
         call = ("touching", *variables[:2]) if len(variables) > 1 else ("seen", *variables)
@@ -218,11 +218,12 @@ def _verb(word: str, things: int) -> str | None:
     return word if word in known else synonym(word, known) or closest(word, known, 0.8)
 
 
-_TAKES = {name: word.takes for name, word in RULES.words.items()} | {
-    name: quantity.takes for name, quantity in RULES.quantities.items()
+_ARGUMENT_KINDS = {name: word.argument_kinds for name, word in RULES.predicates.items()} | {
+    name: quantity.argument_kinds for name, quantity in RULES.quantities.items()
 }
 _RELATIONS = [
-    [name for name, takes in _TAKES.items() if takes == ("object",) * things] for things in (1, 2)
+    [name for name, kinds in _ARGUMENT_KINDS.items() if kinds == ("object",) * things]
+    for things in (1, 2)
 ]
 
 

@@ -282,7 +282,7 @@ def _with_edit(
     return replace(fault, hint=best if fault.hint is None or own else f"{fault.hint}; {best}")
 
 
-EDIT_WORDS = (*RULES.quantities, *RULES.words, *WORDS)
+EDIT_WORDS = (*RULES.quantities, *RULES.predicates, *WORDS)
 
 
 @dataclass(frozen=True, slots=True)

@@ -210,7 +210,7 @@ class _FormulaChecker:
                 what, said = f"'{one}' is an object, and is not compared", f"named({one}, {name})"
             case (Measure() as measure, Number() as number) if measure.name in self.facts:
                 return self.fact_compared(measure, number)
-            case (Measure(name="signal", words=(one,)), Variable(name=name)):
+            case (Measure(name="signal", arguments=(one,)), Variable(name=name)):
                 what, said = "a signal is compared with a word", f"signal_is({one}, {name})"
             case _:
                 return None
@@ -221,16 +221,17 @@ class _FormulaChecker:
     @property
     def facts(self) -> AnySet[str]:
         """Words that are true or false, and no quantities."""
-        return self.vocabulary.words.keys() - self.vocabulary.quantities.keys()
+        return self.vocabulary.predicates.keys() - self.vocabulary.quantities.keys()
 
     def fact_compared(self, fact: Measure, number: Number) -> Fault:
         """The error of what is true or false and is compared; with a quantity of such numbers, if any."""
         alike = (
             name
             for name, known in self.vocabulary.quantities.items()
-            if len(known.takes) == len(fact.words) and known.dimension == number.dimension
+            if len(known.argument_kinds) == len(fact.arguments)
+            and known.dimension == number.dimension
         )
-        words = ", ".join(fact.words)
+        words = ", ".join(fact.arguments)
         meant = next(alike, None)
         hint = meant and f"write `{meant}({words})` in place of `{fact.name}({words})`"
         what = f"'{fact.name}' is true or false, and is not compared"
@@ -251,10 +252,12 @@ class _FormulaChecker:
         found = {name for part in children(node) for name in self.unbound(part)}
         if isinstance(node, Predicate | Measure):
             table = (
-                self.vocabulary.words if isinstance(node, Predicate) else self.vocabulary.quantities
+                self.vocabulary.predicates
+                if isinstance(node, Predicate)
+                else self.vocabulary.quantities
             )
-            takes = table[node.name].takes if node.name in table else ()
-            found |= {w for w, t in zip(node.words, takes, strict=False) if t == "object"}
+            kinds = table[node.name].argument_kinds if node.name in table else ()
+            found |= {w for w, t in zip(node.arguments, kinds, strict=False) if t == "object"}
         bound = {node.variable} if isinstance(node, Quantified) else set()
         return found - bound - set(self.scope)
 
@@ -313,7 +316,7 @@ class _FormulaChecker:
             return
         if node.name in self.vocabulary.quantities:
             yield from self.called(Measure(node.name, (), node.span))
-            if not self.vocabulary.quantities[node.name].takes:
+            if not self.vocabulary.quantities[node.name].argument_kinds:
                 what = f"'{node.name}' is a quantity, and is written with parentheses"
                 yield node.span, what, f"{node.name}()", f"write `{node.name}()`"
             return
@@ -330,7 +333,7 @@ class _FormulaChecker:
         yield node.span, what, expected, near
 
     def called(self, call: Predicate | Measure) -> Iterator[Fault]:
-        self.used |= set(call.words) & set(self.scope)
+        self.used |= set(call.arguments) & set(self.scope)
         yield from check_call(call, self.vocabulary, self.scope)
 
 
@@ -348,9 +351,9 @@ def _objects_in(rule: Rule, vocabulary: Vocabulary) -> list[str]:
     """The names used for objects in a rule, in order."""
     found: list[str] = []
     for node in (n for formula in rule.formulas for n in walk(formula)):
-        table = vocabulary.words if isinstance(node, Predicate) else vocabulary.quantities
+        table = vocabulary.predicates if isinstance(node, Predicate) else vocabulary.quantities
         if isinstance(node, Predicate | Measure) and node.name in table:
-            takes = table[node.name].takes
-            found += [w for w, t in zip(node.words, takes, strict=False) if t == "object"]
+            kinds = table[node.name].argument_kinds
+            found += [w for w, t in zip(node.arguments, kinds, strict=False) if t == "object"]
     bound = {n.variable for f in rule.formulas for n in walk(f) if isinstance(n, Quantified)}
     return [w for w in dict.fromkeys(found) if w not in bound]

@@ -353,8 +353,8 @@ class Compiler:
         names = [name for name, _ in scope]
         # An inner variable shadows an outer one of the same name.
         axis = {name: i for i, name in enumerate(names)}
-        order = tuple(axis[w] for w in node.words if w in axis)
-        words = tuple(axis.get(w, w) for w in node.words)
+        order = tuple(axis[w] for w in node.arguments if w in axis)
+        words = tuple(axis.get(w, w) for w in node.arguments)
         key = ("look", type(node).__name__, node.name, words)
         step = Operation("look", axes=frozenset(order), node=node, order=order)
         return ValueRef(self.program.add(key, step), 0, frozenset(order), certain)

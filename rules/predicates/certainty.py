@@ -2,7 +2,6 @@
 
 Motion segmentation splits machines and includes shadows. A small, hardly visible region, or one close to a
 larger one, may be a part of that; alarms that call for a person, or end a task, require more.
-
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from visup.rules.presence.object_tracks import presence_memory
 from visup.rules.presence.settings import PresenceSettings
 from visup.rules.wording.sentences import is_of_kind
 
-FRAGMENTS = FragmentSettings()
+FRAGMENT_SETTINGS = FragmentSettings()
 LEAST_SHARE = 2 * PresenceSettings().least_share
 """Least share of the image of an object of its own, unless it is far away."""
 LEAST_CONFIDENCE = 0.5
@@ -30,9 +29,9 @@ START_S = PresenceSettings().start_s
 ENTRY_DISTANCE = 0.5
 """Greatest distance from the border of the first sighting of an object that came over it, in its sizes."""
 ENTRY_ADVANCE = 0.25
-"""How far its other side has moved away from that border since, in its sizes."""
+"""How far its far side must have moved away from that border since, in its sizes."""
 LEAST_VISIBLE = 0.5
-"""Least share of its area of what came in, as far as that was seen."""
+"""Least visible share of the area of an object that came in."""
 KEEP_OUT = "keep_out"
 """Prefix of the names of zones forbidden to all."""
 
@@ -54,16 +53,20 @@ def standalone(facts: Snapshot) -> Codes:
     certain &= area >= LEAST_SHARE * width * height
     certain &= (whole(facts) == YES) | (identified(facts) == YES)
     clearance = np.maximum(
-        FRAGMENTS.apart * image_diagonal(facts.mind.frame_size),
-        FRAGMENTS.apart_size * np.sqrt(area),
+        FRAGMENT_SETTINGS.apart * image_diagonal(facts.mind.frame_size),
+        FRAGMENT_SETTINGS.apart_size * np.sqrt(area),
     )
     gap = facts.pair_intervals(GAP)
     near_others = np.isfinite(gap[1]) & (gap[0] <= clearance[:, None])
-    larger = area[:, None] <= FRAGMENTS.part * area[None]
+    larger = area[:, None] <= FRAGMENT_SETTINGS.part * area[None]
     near_others |= facts.relation_codes("moving_together") == YES
-    alone = certain & ~(near_others & larger).any(axis=1)
+    separate = certain & ~(near_others & larger).any(axis=1)
     return facts.codes_of_ids(
-        {b.id for b, standing_alone in zip(beliefs, alone.tolist(), strict=True) if standing_alone}
+        {
+            b.id
+            for b, standing_alone in zip(beliefs, separate.tolist(), strict=True)
+            if standing_alone
+        }
     )
 
 
@@ -82,9 +85,9 @@ def came_in(facts: Snapshot) -> Codes:
     """Whether an object came over the border of the image, by where it was first seen and has gone since.
 
     An object that starts inside the picture was there before, is attached to something that was, or is its
-    shadow. A fast one is first seen a little inside. What is first seen at the border, but stays there, may
-    be attached to something outside, even if its region no longer reaches the border. And a region that
-    leaps, or shrinks to the rest of what it was, is hardly one thing.
+    shadow. A fast one is first seen a little inside. An object that is first seen at the border and stays
+    there may be attached to something outside, even if its region no longer reaches the border. And a
+    region that leaps, or shrinks to a remainder of itself, is hardly one object.
     """
     memory, size = presence_memory(facts.mind), facts.mind.frame_size
 
@@ -123,7 +126,7 @@ def of_kind(facts: Snapshot) -> Codes:
 
 
 def at_home(facts: Snapshot) -> Codes:
-    """Whether an object was in a forbidden zone when the video began, which is then its own."""
+    """Whether an object was in a forbidden zone when the video began: the zone is then its home."""
     zones = [z.polygon for z in facts.mind.zones if z.name.startswith(KEEP_OUT)]
     memory = presence_memory(facts.mind)
     if not zones or memory.start is None:

@@ -7,10 +7,7 @@ import numpy as np
 from visup.agent import Presence
 from visup.rules.geometry.regions import image_diagonal
 from visup.rules.predicates.snapshot import SIGMAS, Floats, Snapshot, exact, interval_between
-from visup.rules.relations.kinematics import RelationSettings
 from visup.rules.wording.sentences import believed_name
-
-STILL_SPEED = RelationSettings().still_speed
 
 
 def _seen(facts: Snapshot, values: list[float]) -> Floats:
@@ -50,9 +47,9 @@ def depth(facts: Snapshot) -> Floats:
     known = [
         b if b.presence is Presence.SEEN and b.depth is not None else None for b in facts.beliefs
     ]
-    away = np.array([np.nan if b is None else b.depth for b in known], dtype=float)
-    spread = np.array([0.0 if b is None else SIGMAS * (b.depth_sigma or 0.0) for b in known])
-    return interval_between(np.maximum(away - spread, 0.0), away + spread)
+    depths = np.array([np.nan if b is None else b.depth for b in known], dtype=float)
+    margins = np.array([0.0 if b is None else SIGMAS * (b.depth_sigma or 0.0) for b in known])
+    return interval_between(np.maximum(depths - margins, 0.0), depths + margins)
 
 
 def depth_difference(facts: Snapshot) -> Floats:
@@ -61,11 +58,16 @@ def depth_difference(facts: Snapshot) -> Floats:
     if all(d != d for d in depth.tolist()):  # NaN is not equal to itself
         return facts.unknown(2)
     spread = np.array([SIGMAS * (b.depth_sigma or 0.0) for b in facts.beliefs])
-    apart, join = np.abs(depth[:, None] - depth[None]), np.hypot(spread[:, None], spread[None])
+    difference, margins = (
+        np.abs(depth[:, None] - depth[None]),
+        np.hypot(spread[:, None], spread[None]),
+    )
     least = np.minimum(depth[:, None], depth[None])
     with np.errstate(invalid="ignore", divide="ignore"):
         share = np.where(least > 0, 1.0 / least, np.nan)
-        return interval_between(np.maximum(apart - join, 0.0) * share, (apart + join) * share)
+        return interval_between(
+            np.maximum(difference - margins, 0.0) * share, (difference + margins) * share
+        )
 
 
 def confidence(facts: Snapshot) -> Floats:
@@ -75,11 +77,11 @@ def confidence(facts: Snapshot) -> Floats:
 
 def heading(facts: Snapshot) -> Floats:
     """Direction of motion of each object in the image, degrees: 0 to the right, 90 up; unknown at rest."""
-    slow = STILL_SPEED * image_diagonal(facts.mind.frame_size)
+    still_speed = facts.relation_settings.still_speed * image_diagonal(facts.mind.frame_size)
     found = []
     for belief in facts.beliefs:
         x, y = belief.region.velocity
-        moves = np.hypot(x, y) > slow
+        moves = np.hypot(x, y) > still_speed
         found.append(float(np.degrees(np.arctan2(-y, x)) % 360.0) if moves else np.nan)
     return _seen(facts, found)
 

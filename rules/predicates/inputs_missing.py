@@ -12,14 +12,14 @@ from types import MappingProxyType
 from visup.agent import Mind
 from visup.rules.formula.nodes import SIGNAL_WORDS
 
-REMEMBERED = frozenset(
+PERSISTENT_WORDS = frozenset(
     {"expected", "engaged", "unexpected", "actor", "named", "identified", "of_kind"}
 )
 """Words about beliefs that outlive their evidence."""
 
-_SPECIAL: Mapping[str, frozenset[str]] = MappingProxyType(
+_PERCEPTS_READ: Mapping[str, frozenset[str]] = MappingProxyType(
     {
-        **dict.fromkeys(REMEMBERED, frozenset()),
+        **dict.fromkeys(PERSISTENT_WORDS, frozenset()),
         "stale": frozenset(),  # it is about missing inputs itself
         "healthy": frozenset({"health"}),
         **dict.fromkeys(SIGNAL_WORDS, frozenset({"signal"})),
@@ -31,7 +31,7 @@ _SPECIAL: Mapping[str, frozenset[str]] = MappingProxyType(
 
 def percepts_read(word: str) -> frozenset[str]:
     """Kinds of percept that a word reads; regions by default."""
-    return _SPECIAL.get(word, frozenset({"region"}))
+    return _PERCEPTS_READ.get(word, frozenset({"region"}))
 
 
 def inputs_missing(mind: Mind, word: str) -> bool:

@@ -15,17 +15,13 @@ from visup.rules.formula.truth import MAYBE, NO, YES
 from visup.rules.geometry.borders import common_border
 from visup.rules.geometry.regions import image_diagonal
 from visup.rules.predicates.snapshot import Codes, Floats, Snapshot, exact
-from visup.rules.relations.kinematics import RelationSettings
 
-LONG = 1.3
+LEAST_ELONGATION = 1.3
 """Least ratio of length to width for a meaningful long axis."""
 
 ALIGNED_DEG = 10.0
 """Axes that differ by less are aligned; by more than `APART_DEG` they are not; in between is unknown."""
 APART_DEG = 15.0
-
-ALONG = RelationSettings().touch_enter
-"""Gap up to which one outline lies along another, image diagonals: that at which two touch."""
 
 
 def orientation(facts: Snapshot) -> Floats:
@@ -35,16 +31,16 @@ def orientation(facts: Snapshot) -> Floats:
 
 def axis_angle(facts: Snapshot) -> Floats:
     """Angle between the long axes of all pairs, degrees from 0 to 90; unknown if one is round."""
-    between = _between(_axes(facts))
-    known = np.isfinite(between)
-    return np.array((np.where(known, between, -np.inf), np.where(known, between, np.inf)))
+    angles = _angles_between(_axes(facts))
+    known = np.isfinite(angles)
+    return np.array((np.where(known, angles, -np.inf), np.where(known, angles, np.inf)))
 
 
 def aligned(facts: Snapshot) -> Codes:
     """Whether the long axes of two objects are parallel."""
-    between = _between(_axes(facts))
+    angles = _angles_between(_axes(facts))
     with np.errstate(invalid="ignore"):
-        codes = np.where(between <= ALIGNED_DEG, YES, np.where(between >= APART_DEG, NO, MAYBE))
+        codes = np.where(angles <= ALIGNED_DEG, YES, np.where(angles >= APART_DEG, NO, MAYBE))
     return codes.astype(np.int8)
 
 
@@ -56,15 +52,16 @@ OUTLINE_RELATIONS: Mapping[str, tuple[Callable[[Snapshot], Codes], str]] = Mappi
 
 def openness(facts: Snapshot) -> Floats:
     """Free share of each outline's convex hull, 0 to 1: for jaws, a door, scissors."""
-    return exact(np.array([_free(b) for b in facts.beliefs], dtype=float))
+    return exact(np.array([_openness(b) for b in facts.beliefs], dtype=float))
 
 
 def shared_outline(facts: Snapshot) -> Floats:
     """Share of one outline that lies along the other, of all pairs, 0 to 1: the greater one of the two.
 
-    Unknown if one is out of view.
+    One lies along the other where their gap is one at which two touch. Unknown if one is out of view.
     """
-    beliefs, near = facts.beliefs, ALONG * image_diagonal(facts.mind.frame_size)
+    beliefs = facts.beliefs
+    near = facts.relation_settings.touch_enter * image_diagonal(facts.mind.frame_size)
     low = np.full((len(beliefs), len(beliefs)), -np.inf)
     high = -low
     seen = [k for k, b in enumerate(beliefs) if b.presence is Presence.SEEN]
@@ -87,18 +84,18 @@ def _axis(belief: ObjectBelief) -> float:
         return np.nan
     xx, xy, yy = (m[k] / m["m00"] for k in ("mu20", "mu11", "mu02"))
     mean, spread = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
-    if mean + spread < LONG**2 * max(mean - spread, 1e-9):
+    if mean + spread < LEAST_ELONGATION**2 * max(mean - spread, 1e-9):
         return np.nan
     return float(np.degrees(0.5 * np.arctan2(-2 * xy, xx - yy)) % 180.0)
 
 
-def _between(axes: NDArray[np.float64]) -> NDArray[np.float64]:
-    turn = np.abs(axes[:, None] - axes[None]) % 180.0
-    between: NDArray[np.float64] = np.minimum(turn, 180.0 - turn)
-    return between
+def _angles_between(axes: NDArray[np.float64]) -> NDArray[np.float64]:
+    difference = np.abs(axes[:, None] - axes[None]) % 180.0
+    angles: NDArray[np.float64] = np.minimum(difference, 180.0 - difference)
+    return angles
 
 
-def _free(belief: ObjectBelief) -> float:
+def _openness(belief: ObjectBelief) -> float:
     if belief.presence is not Presence.SEEN or len(belief.region.contour) < 3:
         return np.nan
     outline = np.asarray(belief.region.contour, dtype=np.float32)

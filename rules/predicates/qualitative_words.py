@@ -1,8 +1,8 @@
 """Allen's relations along an image axis, and TPCC of three objects, by their names.
 
-They use the current boxes and centres alone, without hysteresis: edges nearer than `LEVEL` are level, and
-directions within `STRAIGHT_DEG` of straight ahead, back or sideways are straight. They may flicker at a
-limit; `for` and `in 3 of 5 samples` steady them.
+They use the current boxes and centres alone, without hysteresis: edges nearer than `LEVEL_TOLERANCE` are
+level, and directions within `STRAIGHT_DEG` of straight ahead, back or sideways are straight. They may
+flicker at a limit; `for` and `in 3 of 5 samples` steady them.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from visup.rules.formula.truth import MAYBE, NO, YES
 from visup.rules.geometry.regions import image_diagonal
 from visup.rules.predicates.snapshot import Codes, Floats, Snapshot
 
-LEVEL = 0.0025
+LEVEL_TOLERANCE = 0.0025
 """Image diagonals; the mean of the two thresholds of RCC-8 of boxes."""
 STRAIGHT_DEG = 5.0
 ALLEN_RELATIONS = tuple(ALLEN_NAMES.values())
@@ -52,12 +52,12 @@ _SIGNS: Mapping[str, tuple[int, int, int, int]] = MappingProxyType(
 PairEvaluator = Callable[[Snapshot, str], Codes]
 
 
-def along(axis: int) -> PairEvaluator:
+def allen_evaluator(axis: int) -> PairEvaluator:
     """The evaluation of Allen's relations along an axis: 0 to the right, 1 down."""
 
     def evaluate(facts: Snapshot, relation: str) -> Codes:
         begin, end = _spans(facts, axis)
-        level = LEVEL * image_diagonal(facts.mind.frame_size)
+        level = LEVEL_TOLERANCE * image_diagonal(facts.mind.frame_size)
         differences = (
             begin[:, None] - begin,
             end[:, None] - end,
@@ -85,7 +85,7 @@ def _sign(difference: Floats, level: float) -> NDArray[np.int8]:
         return np.where(np.abs(difference) <= level, 0, np.sign(difference)).astype(np.int8)
 
 
-def three_points(facts: Snapshot, relation: str) -> Codes:
+def tpcc_codes(facts: Snapshot, relation: str) -> Codes:
     """The TPCC relation of the third object to the line from the first to the second."""
     centres = np.array([b.region.centroid for b in facts.beliefs], dtype=float).reshape(-1, 2)
     centres[~_seen(facts)] = np.nan
@@ -96,13 +96,13 @@ def three_points(facts: Snapshot, relation: str) -> Codes:
     dot = (straight * there).sum(axis=3)
     # Positive to the left, since y points down in images.
     turn = np.degrees(np.arctan2(-cross, dot))
-    level = LEVEL * image_diagonal(facts.mind.frame_size)
+    level = LEVEL_TOLERANCE * image_diagonal(facts.mind.frame_size)
     same = far <= level
     if relation == "sam":
         return _codes(same, np.isnan(far))
     near = far < np.linalg.norm(ahead, axis=2)[:, :, None]
-    held = _in_sector(turn, relation[1:]) & (near == (relation[0] == "c")) & ~same
-    return _codes(held, np.isnan(turn + far))
+    holds = _in_sector(turn, relation[1:]) & (near == (relation[0] == "c")) & ~same
+    return _codes(holds, np.isnan(turn + far))
 
 
 _STRAIGHT = {"sf": 0.0, "sl": 90.0, "sb": 180.0, "sr": -90.0}
@@ -131,5 +131,5 @@ def _seen(facts: Snapshot) -> NDArray[np.bool_]:
     return np.array([b.presence is Presence.SEEN for b in facts.beliefs], dtype=bool)
 
 
-def _codes(held: NDArray[np.bool_], unknown: NDArray[np.bool_]) -> Codes:
-    return np.where(unknown, MAYBE, np.where(held, YES, NO)).astype(np.int8)
+def _codes(holds: NDArray[np.bool_], unknown: NDArray[np.bool_]) -> Codes:
+    return np.where(unknown, MAYBE, np.where(holds, YES, NO)).astype(np.int8)

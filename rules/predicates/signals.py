@@ -11,12 +11,12 @@ from visup.agent import Mind
 from visup.rules.formula.truth import MAYBE, NO, YES
 from visup.rules.predicates.snapshot import Codes, Floats, Snapshot
 
-KIND = "signal"
+PERCEPT_KIND = "signal"
 
 
 def known_signals(mind: Mind) -> Mapping[str, Any]:
     """Current signals, by name; for the same name the last report counts."""
-    reports = (p.value for p in mind.percepts.get(KIND, ()) if isinstance(p.value, Mapping))
+    reports = (p.value for p in mind.percepts.get(PERCEPT_KIND, ()) if isinstance(p.value, Mapping))
     return {name: value for values in reports for name, value in values.items()}
 
 
@@ -29,8 +29,8 @@ def number(facts: Snapshot, name: str) -> Floats:
 def is_on(facts: Snapshot, name: str) -> Codes:
     """Whether a signal is true, or a nonzero number; unknown for a word."""
     value = known_signals(facts.mind).get(name)
-    plain = isinstance(value, bool | np.bool_) or number_of(value) is not None
-    return _code(bool(value) if plain else None)
+    is_number = isinstance(value, bool | np.bool_) or number_of(value) is not None
+    return _code(bool(value) if is_number else None)
 
 
 def is_word(facts: Snapshot, name: str, word: str) -> Codes:
@@ -46,8 +46,8 @@ def is_known(facts: Snapshot, name: str) -> Codes:
 
 def number_of(value: Any) -> float | None:
     """A signal as a number; None if it is not one."""
-    plain = isinstance(value, int | float | np.integer | np.floating)
-    if not plain or isinstance(value, bool) or not np.isfinite(value):
+    is_number = isinstance(value, int | float | np.integer | np.floating)
+    if not is_number or isinstance(value, bool) or not np.isfinite(value):
         return None
     return float(value)
 

@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 from visup.agent import Mind, ObjectBelief
 from visup.rules.formula.truth import NO, YES
 from visup.rules.predicates._snapshot_jit import pair_quantities
-from visup.rules.relations.kinematics import Kinematics
-from visup.rules.relations.reasoner import NAMES, kinematics
+from visup.rules.relations.kinematics import Kinematics, RelationSettings
+from visup.rules.relations.reasoner import NAMES, kinematics, relation_settings
 from visup.rules.wording.sentences import short
 
 Codes = NDArray[np.int8]
 Floats = NDArray[np.float64]
 
-ITSELF = frozenset({"equal", "outlines_equal"})
+REFLEXIVE_RELATIONS = frozenset({"equal", "outlines_equal"})
 SIGMAS = 1.0
 """Half width of a measured quantity's interval, standard deviations."""
 
@@ -42,6 +42,7 @@ class Snapshot:
         ids: Their ids.
         row: Id -> index in `ids`, and so in all arrays.
         measured: Quantities of all pairs.
+        relation_settings: The run's limits of relations, which predicates share.
     """
 
     def __init__(self, mind: Mind) -> None:
@@ -50,6 +51,7 @@ class Snapshot:
         self.ids = tuple(b.id for b in self.beliefs)
         self.row = {object_id: i for i, object_id in enumerate(self.ids)}
         self.measured: Kinematics = kinematics(mind)
+        self.relation_settings: RelationSettings = relation_settings(mind)
         self._names: dict[int, str] = {}
         self._codes: dict[str, Codes] = {}
         self._paired: tuple[Floats, Codes] | None = None
@@ -92,7 +94,7 @@ class Snapshot:
         tables = self.mind.truth_tables(names, self.ids)
         # An object is equal to itself, and has no other relation to itself.
         n = len(self.ids)
-        tables.reshape(len(names), n * n)[:, :: n + 1] = _of_itself(names)
+        tables.reshape(len(names), n * n)[:, :: n + 1] = _codes_on_diagonal(names)
         return tables
 
     def _coupled(self) -> Codes:
@@ -156,9 +158,9 @@ class Snapshot:
 
 
 @lru_cache(maxsize=256)
-def _of_itself(names: tuple[str, ...]) -> Codes:
+def _codes_on_diagonal(names: tuple[str, ...]) -> Codes:
     """(k, 1) whether relations hold between an object and itself."""
-    codes = np.array([YES if name in ITSELF else NO for name in names], dtype=np.int8)
+    codes = np.array([YES if name in REFLEXIVE_RELATIONS else NO for name in names], dtype=np.int8)
     return codes.reshape(-1, 1)
 
 

@@ -29,7 +29,7 @@ from visup.rules.predicates import signals as signal_words
 from visup.rules.predicates._snapshot_jit import CLOSING, CONTACT, GAP, RELATIVE
 from visup.rules.predicates.coarse_relations import COARSE_RELATIONS
 from visup.rules.predicates.motion import moving, moving_clearly
-from visup.rules.predicates.qualitative_words import along, three_points
+from visup.rules.predicates.qualitative_words import allen_evaluator, tpcc_codes
 from visup.rules.predicates.snapshot import (
     RELATION_NAMES,
     SIGMAS,
@@ -44,7 +44,7 @@ from visup.rules.presence.object_tracks import presence_memory
 from visup.rules.relations.zones import QUESTIONS, zone_truth
 from visup.rules.wording.sentences import believed_name
 
-IMPLIED = MappingProxyType(
+IMPLIED_BY = MappingProxyType(
     {
         "converging": frozenset({"converging", "touching", "coupled"}),
         "touching": frozenset({"touching", "coupled"}),
@@ -64,14 +64,15 @@ class PredicateDefinition:
     """A predicate of the rule language: true, false or unknown.
 
     Attributes:
-        takes: Kinds of its arguments: 'object', 'relation', 'kind', 'name', 'zone', 'signal', 'word',
+        argument_kinds: Kinds of its arguments: 'object', 'relation', 'kind', 'name', 'zone', 'signal',
+            'word',
             'allen' or 'tpcc' (relations of these calculi).
         evaluate: Its evaluation: codes of all objects, one dimension per argument 'object', in order; the
             other arguments are passed as words.
         meaning: Its meaning in one clause.
     """
 
-    takes: tuple[str, ...]
+    argument_kinds: tuple[str, ...]
     evaluate: Callable[..., Codes]
     meaning: str
 
@@ -81,14 +82,14 @@ class QuantityDefinition:
     """A quantity of the rule language.
 
     Attributes:
-        takes: Kinds of its arguments.
+        argument_kinds: Kinds of its arguments.
         dimension: Its dimension.
         evaluate: Its intervals in the base unit, (2, ...), for all objects.
         meaning: Its meaning in one clause.
         plain: Whether it is a plain number instead of a share.
     """
 
-    takes: tuple[str, ...]
+    argument_kinds: tuple[str, ...]
     dimension: Dimension
     evaluate: Callable[..., Floats]
     meaning: str
@@ -108,20 +109,20 @@ class Vocabulary:
     """The names available in formulas.
 
     Attributes:
-        words: Relations and facts.
+        predicates: Relations and facts.
         quantities: Numbers.
     """
 
-    words: Mapping[str, PredicateDefinition]
+    predicates: Mapping[str, PredicateDefinition]
     quantities: Mapping[str, QuantityDefinition]
 
 
 def expected(facts: Snapshot, name: str) -> Codes:
     """Whether an active task expects a relation between two objects now."""
-    codes, fine, row = facts.pairs(NO), IMPLIED.get(name) or {name}, facts.row
+    codes, sufficient, row = facts.pairs(NO), IMPLIED_BY.get(name) or {name}, facts.row
     for task in facts.mind.tasks:
         for e in task.expected:
-            if e.relation in fine and len(e.objects) == 2:
+            if e.relation in sufficient and len(e.objects) == 2:
                 i, j = (row.get(o, -1) for o in e.objects)
                 if i >= 0 and j >= 0 and i != j:
                     codes[i, j] = codes[j, i] = YES
@@ -130,15 +131,15 @@ def expected(facts: Snapshot, name: str) -> Codes:
 
 def engaged(facts: Snapshot) -> Codes:
     """Whether an active task currently expects a relation of an object to another."""
-    wanted = {o for task in facts.mind.tasks for e in task.expected for o in e.objects}
-    return facts.codes_of_ids(wanted)
+    expected_objects = {o for task in facts.mind.tasks for e in task.expected for o in e.objects}
+    return facts.codes_of_ids(expected_objects)
 
 
 def unexpected(facts: Snapshot) -> Codes:
     """Whether no active task explains an object; without a task no object is unexpected."""
     unexplained = [task.unexplained for task in facts.mind.tasks]
-    nobody = set(unexplained[0]).intersection(*unexplained[1:]) if unexplained else ()
-    return facts.codes_of_ids(nobody)
+    unexplained_by_all = set(unexplained[0]).intersection(*unexplained[1:]) if unexplained else ()
+    return facts.codes_of_ids(unexplained_by_all)
 
 
 def is_actor(facts: Snapshot) -> Codes:
@@ -150,8 +151,8 @@ def is_actor(facts: Snapshot) -> Codes:
 def is_bystander(facts: Snapshot) -> Codes:
     """Whether a task tolerates an object, and none uses it as an actor."""
     tasks = facts.mind.tasks
-    acting = {b.object_id for task in tasks for b in task.bindings}
-    return facts.codes_of_ids({i for task in tasks for i in task.bystanders} - acting)
+    actors = {b.object_id for task in tasks for b in task.bindings}
+    return facts.codes_of_ids({i for task in tasks for i in task.bystanders} - actors)
 
 
 def one_machine(facts: Snapshot) -> Codes:
@@ -212,8 +213,10 @@ def _since(moment: str) -> Callable[[Snapshot], Floats]:
     return lambda facts: np.array(([facts.mind.time - read(b) for b in facts.beliefs],) * 2)
 
 
-def _presence(wanted: Presence) -> Callable[[Snapshot], Codes]:
-    return lambda facts: facts.codes_of_ids([b.id for b in facts.beliefs if b.presence is wanted])
+def _presence(expected_objects: Presence) -> Callable[[Snapshot], Codes]:
+    return lambda facts: facts.codes_of_ids(
+        [b.id for b in facts.beliefs if b.presence is expected_objects]
+    )
 
 
 def in_forbidden_zone(facts: Snapshot) -> Codes:
@@ -242,8 +245,11 @@ PREDICATES: MappingProxyType[str, PredicateDefinition] = MappingProxyType(
     {
         **{name: _relation(name) for name in RELATION_NAMES},
         **{
-            name: PredicateDefinition(_TWO, look, meaning)
-            for name, (look, meaning) in {**COARSE_RELATIONS, **outline.OUTLINE_RELATIONS}.items()
+            name: PredicateDefinition(_TWO, evaluate, meaning)
+            for name, (evaluate, meaning) in {
+                **COARSE_RELATIONS,
+                **outline.OUTLINE_RELATIONS,
+            }.items()
         },
         "expected": PredicateDefinition(
             ("relation", "object", "object"), expected, "an active task expects the relation"
@@ -305,12 +311,15 @@ PREDICATES: MappingProxyType[str, PredicateDefinition] = MappingProxyType(
         "healthy": PredicateDefinition((), healthy, "the image is usable"),
         **{
             name: PredicateDefinition(
-                ("allen", *_TWO), along(axis), f"Allen's relation of boxes, {way}"
+                ("allen", *_TWO), allen_evaluator(axis), f"Allen's relation of boxes, {direction}"
             )
-            for name, axis, way in (("along_x", 0, "to the right"), ("along_y", 1, "downwards"))
+            for name, axis, direction in (
+                ("along_x", 0, "to the right"),
+                ("along_y", 1, "downwards"),
+            )
         },
         "tpcc": PredicateDefinition(
-            ("tpcc", *_TWO, "object"), three_points, "where the third is, for one from a to b"
+            ("tpcc", *_TWO, "object"), tpcc_codes, "where the third is, for one from a to b"
         ),
         "signal_on": PredicateDefinition(
             ("signal",), signal_words.is_on, "the signal is true, or a number other than 0"

@@ -171,6 +171,7 @@ class RelationMemory:
         rcc8: (2, P) RCC-8 of boxes and of outlines, derived from some of these states.
         smooth: The geometry from which position states are decided.
         drift: (M, 2) accumulated image motion of each object due to the camera, pixels.
+        settings: The settings by which they are decided, for others that decide by the same limits.
     """
 
     history: SampleWindow = field(default_factory=SampleWindow)
@@ -179,6 +180,7 @@ class RelationMemory:
     rcc8: HysteresisState = field(default_factory=lambda: unknown_states((2, 0), 0.0))
     smooth: SmoothedGeometry = field(default_factory=lambda: _no_geometry())
     drift: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+    settings: RelationSettings = field(default_factory=RelationSettings)
 
 
 RELATIONS = MemoryKey("rules.relations", RelationMemory())
@@ -192,6 +194,11 @@ def kinematics(mind: Mind) -> Kinematics:
 def sample_window(mind: Mind) -> SampleWindow:
     """The last samples of all bodies, as stored by `RelationReasoner`."""
     return mind.recall(RELATIONS).history
+
+
+def relation_settings(mind: Mind) -> RelationSettings:
+    """The settings of the run's `RelationReasoner`; the defaults before its first step."""
+    return mind.recall(RELATIONS).settings
 
 
 def relation_of(mind: Mind, name: str, a: int, b: int) -> Relation | None:
@@ -252,7 +259,7 @@ class RelationReasoner:
             state = states.state
             derived = np.array((from_signs(state[ORDER]), from_outline_signs(state[OUTLINE])))
             rcc8 = advance(rcc8, derived, mind.time, 0.0)
-        memory = RelationMemory(history, now, states, rcc8, smooth, drift)
+        memory = RelationMemory(history, now, states, rcc8, smooth, drift, s)
         table = RelationTable(now.ids, (self._cells(memory, mind),))
         return Outcome(mind.remember(RELATIONS, memory, relations=table))
 

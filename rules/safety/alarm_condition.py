@@ -132,7 +132,7 @@ def confidence(rule: Rule, ids: tuple[int, ...], values: Evaluation) -> float:
     objects, mind = dict(zip(rule.variables, ids, strict=True)), values.facts.mind
     found = []
     for call in values.compiled.related(rule):
-        a, b = (objects[w] for w in call.words)
+        a, b = (objects[w] for w in call.arguments)
         if mind.truth(call.name, a, b) is Truth.TRUE:
             relation = mind.relation(call.name, a, b)
             found += [relation.confidence] if relation else []

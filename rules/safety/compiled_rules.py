@@ -59,10 +59,10 @@ class Lookup:
 def evaluator(node: Predicate | Measure) -> Callable[[Snapshot], Any]:
     """The evaluator of a fact or quantity, with its non-object arguments bound."""
     fact = isinstance(node, Predicate)
-    word: PredicateDefinition | QuantityDefinition = (RULES.words if fact else RULES.quantities)[
-        node.name
-    ]
-    others = [w for w, t in zip(node.words, word.takes, strict=True) if t != "object"]
+    word: PredicateDefinition | QuantityDefinition = (
+        RULES.predicates if fact else RULES.quantities
+    )[node.name]
+    others = [w for w, t in zip(node.arguments, word.argument_kinds, strict=True) if t != "object"]
     return partial(_evaluate_with, word.evaluate, others) if others else word.evaluate
 
 
@@ -154,7 +154,7 @@ class CompiledRules:
                 call
                 for call in calls(rule.when)
                 if isinstance(call, Predicate) and call.name in RELATION_NAMES
-                if set(call.words) <= set(rule.variables)
+                if set(call.arguments) <= set(rule.variables)
             )
         return self._related[id(rule)]
 

@@ -236,12 +236,14 @@ def _with_variables(text: str) -> tuple[str, tuple[str, ...]]:
     bound = set(_BOUND.findall(text))
 
     def rewritten(call: re.Match[str]) -> str:
-        word: Any = RULES.words.get(call[1]) or RULES.quantities.get(call[1])
+        word: Any = RULES.predicates.get(call[1]) or RULES.quantities.get(call[1])
         names = [a.strip() for a in call[2].split(",")]
-        if word is None or len(names) != len(word.takes):  # reported later, and its names are known
+        if word is None or len(names) != len(
+            word.argument_kinds
+        ):  # reported later, and its names are known
             found.update(dict.fromkeys(n for n in _NAME.findall(call[2]) if n not in bound))
             return call[0]
-        for n, takes in enumerate(word.takes):
+        for n, takes in enumerate(word.argument_kinds):
             if takes == "object":
                 names[n] = f"object_{names[n]}" if names[n].isdecimal() else names[n]
                 if names[n] not in bound and names[n].isidentifier():

@@ -116,7 +116,7 @@ def _signal(
     """Convert a signal word to a plain signal, recorded under a name."""
     if not isinstance(node, Predicate | Measure):
         return None
-    key, words = str(node), node.words
+    key, words = str(node), node.arguments
     if isinstance(node, Measure) and node.name == "signal":
         evaluators[key] = lambda values: number_of(values.get(words[0]))
         return Measure(key, (), node.span)

@@ -50,26 +50,26 @@ Measured = Callable[[Snapshot, tuple[int, ...]], tuple[float, float]]
 def rule_actions() -> Iterator[ActionDefinition]:
     """Every word and quantity of rules that is available in tasks."""
     for name, word in PREDICATES.items():
-        if _fits(name, word.takes):
+        if _fits(name, word.argument_kinds):
             text = name.replace("_", " ")
             yield ActionDefinition(
                 name,
                 holds=(name,),
-                arity=len(word.takes),
+                arity=len(word.argument_kinds),
                 hold_s=0.5,
                 text=text,
-                takes=word.takes,
+                takes=word.argument_kinds,
                 needs=_needs(name),
                 about=word.meaning,
             )
     for name, quantity in QUANTITIES.items():
-        if _fits(name, quantity.takes):
+        if _fits(name, quantity.argument_kinds):
             yield ActionDefinition(
                 name,
                 holds=(),
-                arity=len(quantity.takes),
+                arity=len(quantity.argument_kinds),
                 hold_s=0.5,
-                takes=quantity.takes,
+                takes=quantity.argument_kinds,
                 measures=MEASURES[quantity.dimension],
                 needs=_needs(name),
                 about=quantity.meaning,
@@ -132,10 +132,10 @@ def task_vocabulary(task: Task, actions: Mapping[str, ActionDefinition]) -> Task
             evaluators[key] = _comparison(name, measured, fact.operator, *map(value, amounts))
             text = _compared(fact, name, amounts)
         elif name in SIGNAL_WORDS:
-            evaluators[key] = _word(name, tuple(map(str, fact.words)))
+            evaluators[key] = _word(name, tuple(map(str, fact.arguments)))
             text = f"as `{fact}` says"
         else:
-            zone = next(str(a) for a in fact.words if a in zones)
+            zone = next(str(a) for a in fact.arguments if a in zones)
             evaluators[key] = _zone_evaluator(task, name, zone)
             text = f"{text} {zone}"
         meaning = _draws_near(actions[name]) if _asks_for_nearness(fact) else actions[name]
@@ -253,7 +253,7 @@ def _outside(within: FactEvaluator) -> FactEvaluator:
 def _measure(task: Task, fact: Comparison, amount: Number) -> Measured:
     """The measure of a quantity: on the floor for a gap in metres, else as in rules."""
     name = action_of(fact).name
-    words = tuple(map(str, action_of(fact).words)) if name in SIGNAL_WORDS else ()
+    words = tuple(map(str, action_of(fact).arguments)) if name in SIGNAL_WORDS else ()
     if name == "gap" and dimension(amount) == SIZE:
         distance = floor_distance(task.ground)
 

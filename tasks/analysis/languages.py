@@ -188,7 +188,7 @@ ActorsAction = tuple[str, frozenset[str]]
 def actions_of(task: Task) -> set[ActorsAction]:
     """The actions and comparisons that a task asks for, in whatever order, with their actors."""
     facts = (f for course in _courses_of(task) for f in _facts(course))
-    return {(a.name, frozenset(map(str, a.words))) for a in map(action_of, facts)}
+    return {(a.name, frozenset(map(str, a.arguments))) for a in map(action_of, facts)}
 
 
 def _facts(course: Asked) -> Iterator[Action | Comparison]:

@@ -160,7 +160,7 @@ class CourseCheck:
         one, other = self.actions.get(a.name), self.actions.get(b.name)
         if one is None or other is None:
             return False
-        return set(a.words) == set(b.words) and contradict(one, other)
+        return set(a.arguments) == set(b.arguments) and contradict(one, other)
 
     def invariants(self) -> Iterator[Diagnostic]:
         """Invariants that the task itself breaks."""
@@ -186,7 +186,7 @@ class CourseCheck:
         if not isinstance(required, Action) or not isinstance(fact, Action):
             return invariant.when == "never" and str(required) == str(fact)
         if invariant.when == "never":
-            return (fact.name, {*fact.words}) == (required.name, {*required.words})
+            return (fact.name, {*fact.arguments}) == (required.name, {*required.arguments})
         return self.contradict(required, fact)
 
     def conditions(self) -> Iterator[Diagnostic]:

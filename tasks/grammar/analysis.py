@@ -164,7 +164,7 @@ class Grammar:
                 fact = self._as_fact(course)
                 return name in stages if fact is None else self._empty(fact, stages)
             case Action() | Comparison():
-                return any(a in self._optional for a in action_of(course).words)
+                return any(a in self._optional for a in action_of(course).arguments)
             case Choice(options=options):
                 return any(self._empty(o, stages) for o in options)
             case AnyOrder(least=0):

@@ -169,9 +169,9 @@ def is_periodic(fact: Fact) -> bool:
 def once(periodic: Comparison) -> Predicate:
     """The action of a periodic one."""
     again = action_of(periodic)
-    return Predicate(again.name, again.words, again.span)
+    return Predicate(again.name, again.arguments, again.span)
 
 
 def actors_of(fact: Fact) -> tuple[Name, ...]:
     """The actors and zones of a fact, with positions."""
-    return cast("tuple[Name, ...]", action_of(fact).words)
+    return cast("tuple[Name, ...]", action_of(fact).arguments)

@@ -302,7 +302,7 @@ class _TaskBuilder(ActorBuilder):
         )
 
     def comparison(self, items: list[Any]) -> Comparison:
-        quantity = Measure(items[0].name, items[0].words, items[0].span)
+        quantity = Measure(items[0].name, items[0].arguments, items[0].span)
         span = quantity.span.to(items[-1].span)
         right = items[2] if len(items) == 3 else Range(items[2], items[3], _all(items[2:]))
         return Comparison(quantity, str(items[1]), cast("Term", right), span=span)
@@ -312,7 +312,7 @@ class _TaskBuilder(ActorBuilder):
 
     def periodic(self, items: list[Any]) -> Comparison:
         action, _, *amounts = items
-        again = Measure(action.name, action.words, action.span)
+        again = Measure(action.name, action.arguments, action.span)
         span = amounts[0].span.to(amounts[-1].span)
         period = Period(amounts[0] if len(amounts) > 1 else None, amounts[-1], span)
         return Comparison(again, EVERY, cast("Term", period), span=action.span.to(span))

@@ -128,7 +128,7 @@ def signals_named(task: Task) -> tuple[str, ...]:
     facts = [f for s in task.stages for f in _facts(s)]
     facts += [f for i in task.invariants for f in facts_of(i.condition)]
     asked = (action_of(f) for f in facts if action_of(f).name in SIGNAL_WORDS)
-    return tuple(dict.fromkeys(str(a.words[0]) for a in asked if a.name != "signal_known"))
+    return tuple(dict.fromkeys(str(a.arguments[0]) for a in asked if a.name != "signal_known"))
 
 
 def pause_conditions(task: Task) -> Iterator[StageCondition]:
@@ -205,9 +205,9 @@ def fact_key(task: Task, fact: Fact) -> tuple[str, tuple[str, ...]]:
     """
     action, zones = action_of(fact), {z.name for z in task.zones}
     if action.name in SIGNAL_WORDS:
-        zones = set(map(str, action.words))
-    actors = tuple(str(a) for a in action.words if a not in zones)
-    key = " ".join([action.name, *(a for a in action.words if a in zones)])
+        zones = set(map(str, action.arguments))
+    actors = tuple(str(a) for a in action.arguments if a not in zones)
+    key = " ".join([action.name, *(a for a in action.arguments if a in zones)])
     if isinstance(fact, Comparison):
         between = " to " if is_periodic(fact) else " and "
         amounts = between.join(str(task.amount(a)) for a in bounds_of(fact))

@@ -60,7 +60,7 @@ def is_of_safety(model: MonitoredPhases, invariant: Invariant) -> bool:
     """
     facts = facts_of(invariant.condition)
     zones = {z.name for z in model.task.zones}
-    words = [action_of(f).words for f in facts]
+    words = [action_of(f).arguments for f in facts]
     return any(len(named) > 1 or zones & {str(w) for w in named} for named in words)
 
 

@@ -38,7 +38,7 @@ def rule_completions() -> Iterator[Completion]:
     """Every word of the rule language with its meaning."""
     for vocabulary in (PREDICATES, QUANTITIES):
         for name, word in vocabulary.items():
-            yield Completion(name, "action", f"{', '.join(word.takes)}: {word.meaning}")
+            yield Completion(name, "action", f"{', '.join(word.argument_kinds)}: {word.meaning}")
     for kind, entries in (("action", FUNCTIONS), ("keyword", KEYWORDS)):
         for name in sorted(entries):
             yield Completion(name, kind, ": ".join(entries[name]))

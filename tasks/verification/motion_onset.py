@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from visup.agent import Mind
 from visup.rules.geometry.regions import Floats, image_diagonal
-from visup.rules.relations.kinematics import Kinematics, RelationSettings
-from visup.rules.relations.reasoner import kinematics, sample_window
+from visup.rules.relations.kinematics import Kinematics
+from visup.rules.relations.reasoner import kinematics, relation_settings, sample_window
 from visup.rules.relations.samples import SampleWindow
 
 LAG_S = 0.4
@@ -39,7 +39,7 @@ def moving_bodies(mind: Mind) -> frozenset[int]:
     now, window = kinematics(mind), sample_window(mind)
     if window.ids != now.ids or not len(window.times):
         return frozenset()
-    moving_slowly = moving(now, RelationSettings().still_speed * diagonal)
+    moving_slowly = moving(now, relation_settings(mind).still_speed * diagonal)
     moving_slowly &= moving_more_than_others(window)
     is_moving = moving_slowly | advancing_outlines(window, LEAST_ADVANCE * diagonal)
     return frozenset(i for i, moves in zip(now.ids, is_moving.tolist(), strict=True) if moves)

@@ -14,8 +14,7 @@ import numpy as np
 from visup.agent import Mind, Relation, Truth
 from visup.rules.geometry.regions import image_diagonal
 from visup.rules.geometry.rise import RiseLimits, sudden_rise
-from visup.rules.relations.kinematics import RelationSettings
-from visup.rules.relations.reasoner import kinematics, sample_window
+from visup.rules.relations.reasoner import kinematics, relation_settings, sample_window
 from visup.rules.relations.trend import SIGNS
 
 OPPOSITE = {"converging": "diverging", "diverging": "converging"}
@@ -42,7 +41,7 @@ class NewTrends:
         self._mind = mind
         self._found: dict[tuple[str, tuple[int, ...]], Relation | None] = {}
 
-    def first(self, names: Iterable[str], ids: tuple[int, ...]) -> Relation | None:
+    def first_new(self, names: Iterable[str], ids: tuple[int, ...]) -> Relation | None:
         """The first of some relations that is a trend which has just set in, or None.
 
         The object named first is the one that should come or go: while only the other one moves, a trend must
@@ -64,7 +63,7 @@ class NewTrends:
 
     def _only_second_moves(self, ids: tuple[int, ...]) -> bool:
         """Whether the second of two moves while the first one rests, as far as is known."""
-        now, still = kinematics(self._mind), RelationSettings().still_speed
+        now, still = kinematics(self._mind), relation_settings(self._mind).still_speed
         still *= image_diagonal(self._mind.frame_size)
         return now.one("speed", ids[0]) < still < now.one("speed", ids[1])
 
@@ -89,7 +88,7 @@ def new_trend(mind: Mind, trend: str, ids: tuple[int, ...]) -> Relation | None:
         return None
     speeds = [v for v in (now.one("speed", i) for i in ids) if v == v]  # NaN is not equal to itself
     limits = RiseLimits(
-        sqrt(2.0) * RelationSettings().thresholds.noise_px,
+        sqrt(2.0) * relation_settings(mind).thresholds.noise_px,
         LEAST_CHANGE * image_diagonal(mind.frame_size),
         SWAY_SHARE * min(speeds, default=0.0),
     )

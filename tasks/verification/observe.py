@@ -78,7 +78,7 @@ class RelationLookup:
         self._evaluated: dict[tuple[str, tuple[int, ...]], Relation] = {}
         self._found: dict[tuple[str, tuple[int, ...]], Relation] = {}
         self._passed_by: dict[tuple[int, ...], bool] = {}
-        self._sudden = NewTrends(mind)
+        self._new_trends = NewTrends(mind)
         self._queried: set[str] = set()
         self._after: dict[str, float] = {}
 
@@ -156,8 +156,8 @@ class RelationLookup:
         if entry is not None and entry.name == "coupled" and gapes(self.mind, *objects):
             return None, None  # there is a gap: the coupling will soon be doubted
         if entry is not None:
-            return (None if self._sudden.has_opposite(entry) else entry), None
-        sudden = self._sudden.first(names, objects)
+            return (None if self._new_trends.has_opposite(entry) else entry), None
+        sudden = self._new_trends.first_new(names, objects)
         return sudden, sudden
 
     def goes_round(self, trend: str, objects: tuple[int, ...]) -> bool:

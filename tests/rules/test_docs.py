@@ -13,7 +13,7 @@ from visup.rules.monitoring.cost import MAX_STATE, MAX_VARIABLES
 from visup.rules.monitoring.samples import MIN_SPACING, SAMPLE_HOLD
 from visup.rules.predicates.certainty import KEEP_OUT
 from visup.rules.predicates.snapshot import SIGMAS
-from visup.rules.predicates.vocabulary import IMPLIED, PREDICATES, QUANTITIES
+from visup.rules.predicates.vocabulary import IMPLIED_BY, PREDICATES, QUANTITIES
 from visup.rules.presence.fragments import FragmentSettings
 from visup.rules.presence.settings import PresenceSettings
 from visup.rules.reasoners import ReasonerSettings
@@ -32,10 +32,10 @@ def test_every_example_of_the_page_is_in_the_language(block: str) -> None:
     assert len(parse_rules(block)) >= 2
 
 
-def test_the_page_explains_every_word_and_quantity_with_its_arguments() -> None:
+def test_the_page_lists_every_word_and_quantity_with_its_arguments() -> None:
     told = {n: len(words.split(", ")) if words else 0 for r in ROWS for n, words in _calls(r[0])}
-    known = {n: len(w.takes) for n, w in PREDICATES.items()}
-    known |= {n: len(q.takes) for n, q in QUANTITIES.items()}
+    known = {n: len(w.argument_kinds) for n, w in PREDICATES.items()}
+    known |= {n: len(q.argument_kinds) for n, q in QUANTITIES.items()}
     assert told == known
 
 
@@ -59,9 +59,9 @@ def test_the_page_shows_every_shipped_rule_and_what_expectations_cover() -> None
     told = {
         r[0].strip("`"): set(re.findall(r"\w+", r[1])) | {r[0].strip("`")}
         for r in ROWS
-        if r[0].strip("`") in IMPLIED and len(r) == 2
+        if r[0].strip("`") in IMPLIED_BY and len(r) == 2
     }
-    assert told == {name: set(covers) for name, covers in IMPLIED.items()}
+    assert told == {name: set(covers) for name, covers in IMPLIED_BY.items()}
 
 
 @pytest.mark.parametrize(

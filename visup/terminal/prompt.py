@@ -56,7 +56,7 @@ _WORDS: Mapping[str, Words] = {
     "mark": lambda s: ["start", "end", *s.marks],
     "file": lambda s: ["rules", "task"],
     "command": lambda s: list(COMMANDS),
-    "expression": lambda s: [*RULES.words, *RULES.quantities],
+    "expression": lambda s: [*RULES.predicates, *RULES.quantities],
 }
 
 

@@ -215,10 +215,10 @@ def probes() -> tuple[Rule, ...]:
     """Two rules for each word: one is true when the word is, the other when its negation is."""
     lines = []
     for name, word in PREDICATES.items():
-        lines += _pair(name, word.takes, "{call}", "not {call}")
+        lines += _pair(name, word.argument_kinds, "{call}", "not {call}")
     for name, quantity in QUANTITIES.items():
         one = "1" if quantity.plain else f"1 {quantity.unit}"
-        lines += _pair(name, quantity.takes, f"{{call}} >= {one}", f"{{call}} < {one}")
+        lines += _pair(name, quantity.argument_kinds, f"{{call}} >= {one}", f"{{call}} < {one}")
     return parse_rules("\n".join(lines))
 
 

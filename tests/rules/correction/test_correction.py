@@ -158,10 +158,12 @@ def test_a_call_is_offered_without_one_of_its_arguments_and_without_itself() -> 
         (("tpcc", ["a"], ["tpcc", *["object"] * 3]), "(exists c: tpcc(csf, a, b, c))"),
     ],
 )
-def test_arguments_go_where_they_fit(call: tuple[str, list[str], list[str]], meant: str) -> None:
-    assert arguments.arranged(*call, ["a", "b"]) == meant
+def test_arguments_are_rearranged_to_fit(
+    call: tuple[str, list[str], list[str]], meant: str
+) -> None:
+    assert arguments.rearranged_call(*call, ["a", "b"]) == meant
 
 
 @pytest.mark.parametrize("module", [repair_search, plain_sentences, everyday_phrases, arguments])
-def test_examples_in_the_words_of_correction_hold(module: object) -> None:
+def test_doctests_of_correction_hold(module: object) -> None:
     assert doctest.testmod(module).failed == 0  # type: ignore[arg-type]

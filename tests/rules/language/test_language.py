@@ -60,16 +60,16 @@ windows = st.builds(lambda d: TimeWindow(ZERO, d), durations) | st.builds(
 )
 
 
-def arguments(takes: tuple[str, ...]) -> tuple[str, ...]:
+def arguments(kinds: tuple[str, ...]) -> tuple[str, ...]:
     objects = iter("ab")
     other = {"relation": "converging", "kind": "region", "name": "probe", "zone": "bay"}
     other |= {"signal": "battery", "word": "auto", "allen": "before", "tpcc": "csf"}
-    return tuple(next(objects) if t == "object" else other[t] for t in takes)
+    return tuple(next(objects) if t == "object" else other[t] for t in kinds)
 
 
-of_two = sorted(n for n, word in PREDICATES.items() if word.takes.count("object") <= 2)
+of_two = sorted(n for n, word in PREDICATES.items() if word.argument_kinds.count("object") <= 2)
 predicates = st.sampled_from(of_two).map(
-    lambda name: Predicate(name, arguments(PREDICATES[name].takes))
+    lambda name: Predicate(name, arguments(PREDICATES[name].argument_kinds))
 )
 
 
@@ -87,7 +87,7 @@ def comparisons(draw: st.DrawFn) -> Comparison:
     leave = (
         Number(bound.value + slack, unit) if draw(st.booleans()) and operator[0] in "<>" else None
     )
-    left = Measure(name, arguments(QUANTITIES[name].takes))
+    left = Measure(name, arguments(QUANTITIES[name].argument_kinds))
     terms: list[Term] = [
         left,
         Arithmetic(left, "-", Number(2.0, unit)),

@@ -111,9 +111,9 @@ def written_out(f: Any, where: Objects, repeats: frozenset[str], ids: tuple[int,
         return written_out(part, where, repeats, ids)
 
     match f:
-        case Predicate(name=name, words=words):
+        case Predicate(name=name, arguments=words):
             return Comparison(signal(name, words, where), ">", Number(0.0, Unit.NONE))
-        case Measure(name=name, words=words):
+        case Measure(name=name, arguments=words):
             return signal(name, words, where)
         case Quantified(kind=kind, variable=variable, part=part, may_repeat=may_repeat):
             taken = () if may_repeat else {i for v, i in where.items() if v not in repeats}

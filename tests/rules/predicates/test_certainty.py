@@ -36,29 +36,31 @@ def alone(mind: Mind) -> set[int]:
 
 
 @given(st.floats(60.0, 150.0), st.sampled_from(("left", "above")))
-def test_what_stands_clear_is_a_thing_of_its_own(gap: float, side: str) -> None:
+def test_a_large_isolated_region_is_standalone(gap: float, side: str) -> None:
     other = (
         (200.0 - gap - 40, 300.0, 40.0, 40.0) if side == "left" else (250.0, 300 - gap - 40, 40, 40)
     )
     assert alone(mind_of((200, 300, 150, 120), other, frames=20)) == {1, 2}
 
 
-def test_what_is_small_beside_something_large_may_be_a_part_of_it() -> None:
+def test_a_small_region_near_a_large_one_is_not_standalone() -> None:
     beside = mind_of((200, 300, 150, 120), (352, 330, 40, 40))
     assert 2 not in alone(beside)
     assert 1 in alone(beside)
 
 
-def test_bodies_of_a_size_are_no_parts_of_each_other() -> None:
+def test_neighbours_of_similar_size_are_standalone() -> None:
     assert alone(mind_of((200, 200, 100, 80), (303, 200, 100, 80))) == {1, 2}
 
 
-def test_specks_are_doubtful() -> None:
+def test_specks_are_not_standalone() -> None:
     assert alone(mind_of((200, 200, 100, 80), (400, 100, 12, 12))) == {1}
 
 
 @pytest.mark.parametrize(("confidence", "known"), [(0.8, True), (0.3, False)])
-def test_identified_is_what_is_likelier_a_model_than_none(confidence: float, known: bool) -> None:
+def test_an_object_is_identified_if_a_model_is_likelier_than_none(
+    confidence: float, known: bool
+) -> None:
     mind = mind_of((200, 200, 100, 80))
     belief = mind.objects[1]
     assert yes(mind, identified(Snapshot(mind))) == set()
@@ -71,7 +73,7 @@ def test_identified_is_what_is_likelier_a_model_than_none(confidence: float, kno
     ("name", "corner", "home"),
     [("keep_out", 150, {1}), ("bay", 150, set()), ("keep_out_2", 400, set())],
 )
-def test_a_machine_is_at_home_where_it_was_from_the_start(
+def test_a_machine_is_at_home_in_the_zone_where_it_started(
     name: str, corner: int, home: set[int]
 ) -> None:
     mind = mind_of((200, 200, 100, 80))
@@ -101,7 +103,7 @@ def shrunk(t: float) -> float:
         (lambda t: (540, 60 + 80 * t, 100 - shrunk(t) / 3, 150 - shrunk(t)), False),  # its rest
     ],
 )
-def test_what_came_in_has_come_over_the_border_in_one_piece(
+def test_an_object_came_in_if_it_crossed_the_border_as_a_whole(
     box: Callable[[float], Rect], comes: bool
 ) -> None:
     mind = reason(seen(i, [box_region(1, box(i / 25))]) for i in range(60))[-1].mind

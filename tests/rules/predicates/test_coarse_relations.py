@@ -34,7 +34,7 @@ def code(word: str, holds: str | None) -> int:
 
 
 @pytest.mark.parametrize(("name", "sign"), list(zip(RCC8, SIGNS, strict=True)))
-def test_the_words_are_unions_of_rcc8(name: str, sign: str) -> None:
+def test_coarse_relations_are_unions_of_rcc8(name: str, sign: str) -> None:
     five, two = COARSER["RCC5"][sign], COARSER["RCC2"][sign]
     for relation, word in WORDS.items():
         assert code(word, name) == (YES if five == relation else NO), word
@@ -43,5 +43,5 @@ def test_the_words_are_unions_of_rcc8(name: str, sign: str) -> None:
 
 
 @pytest.mark.parametrize("word", [*WORDS.values(), "connected", "overlapping"])
-def test_what_is_not_known_of_the_eight_is_not_known_of_their_unions(word: str) -> None:
+def test_unions_of_unknown_rcc8_relations_are_unknown(word: str) -> None:
     assert code(word, None) == MAYBE

@@ -21,7 +21,7 @@ def asked(mind: Mind, name: str, *words: str) -> list[float]:
     return [float(v) for v in table[0].ravel()]
 
 
-def test_place_and_size_are_those_of_the_boxes() -> None:
+def test_position_and_size_are_those_of_the_boxes() -> None:
     mind = mind_of((200, 300, 150, 120), (500, 100, 40, 60))
     assert asked(mind, "width") == [150, 40]
     assert asked(mind, "height") == [120, 60]
@@ -57,7 +57,7 @@ def test_depth_is_in_metres_within_its_deviation_and_is_never_compared_with_pixe
             parse_rules(f'rule near(a): info when {wrong} say "{{a}}"')
 
 
-def test_what_is_out_of_sight_or_at_rest_is_unknown() -> None:
+def test_quantities_of_hidden_or_resting_objects_are_unknown() -> None:
     mind = mind_of((200, 300, 150, 120), (500, 100, 40, 60))
     assert asked(mind, "heading") == [-inf, -inf]
     hidden = replace(mind.objects[2], presence=Presence.HIDDEN)
@@ -69,7 +69,7 @@ def test_what_is_out_of_sight_or_at_rest_is_unknown() -> None:
 @pytest.mark.parametrize(
     ("velocity", "degrees"), [((50, 0), 0), ((0, -50), 90), ((-50, 0), 180), ((0, 50), 270)]
 )
-def test_heading_is_where_it_moves_in_the_image(
+def test_heading_is_the_direction_of_motion_in_the_image(
     velocity: tuple[float, float], degrees: float
 ) -> None:
     mind = mind_of((200, 300, 150, 120))
@@ -78,7 +78,7 @@ def test_heading_is_where_it_moves_in_the_image(
     assert asked(moving, "heading") == pytest.approx([degrees])
 
 
-def test_objects_are_counted_those_of_a_name_within_bounds() -> None:
+def test_objects_are_counted_and_those_of_a_name_bounded() -> None:
     mind = mind_of((200, 300, 150, 120), (500, 100, 40, 60))
     assert asked(mind, "objects") == [2.0]
     named = replace(mind.objects[1], candidates=(Candidate("mug", 5.0, 0.9),))

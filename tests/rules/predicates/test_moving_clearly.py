@@ -14,8 +14,9 @@ from tests.rules.runs import reason
 from tests.rules.scenes import box_region, seen
 from visup.agent import Mind, Region
 from visup.rules.formula.truth import MAYBE, NO, YES
-from visup.rules.predicates.motion import CLEAR, moving, moving_clearly
+from visup.rules.predicates.motion import CLEAR_MOTION_SIGMA, moving, moving_clearly
 from visup.rules.predicates.snapshot import Snapshot
+from visup.rules.relations.kinematics import RelationSettings
 
 FRAMES = 40
 SIZE = (480, 360)
@@ -46,12 +47,12 @@ def covered(pace: float) -> list[Mind]:
 
 
 @pytest.mark.parametrize("speed", [3.0, -5.0])
-def test_what_is_pushed_clearly_moves(speed: float) -> None:
+def test_a_pushed_body_clearly_moves(speed: float) -> None:
     assert moving_clearly(Snapshot(pushed(speed))).tolist() == [YES]
 
 
 @pytest.mark.parametrize("pace", [4.0, 9.0])
-def test_what_another_passes_before_does_not_clearly_move_for_long(pace: float) -> None:
+def test_an_occluded_resting_body_does_not_clearly_move_for_long(pace: float) -> None:
     facts = [f for f in map(Snapshot, covered(pace)) if 1 in f.row]
     assert len(facts) > 40
     clearly = [moving_clearly(f)[f.row[1]] == YES and f.one("speed")[f.row[1]] > 25 for f in facts]
@@ -59,13 +60,17 @@ def test_what_another_passes_before_does_not_clearly_move_for_long(pace: float) 
 
 
 @given(st.lists(MOTIONS, min_size=1, max_size=5))
-def test_what_clearly_moves_moves_and_its_velocity_is_known(
+def test_clear_motion_is_motion_of_well_known_velocity(
     motions: list[tuple[float, float]],
 ) -> None:
     speed, sigma = np.array(motions).T
     columns = {"speed": speed, "velocity_sigma": sigma}
-    facts: Any = SimpleNamespace(mind=SimpleNamespace(frame_size=SIZE), one=columns.__getitem__)
-    wide = sigma > CLEAR * np.hypot(*SIZE)
+    facts: Any = SimpleNamespace(
+        mind=SimpleNamespace(frame_size=SIZE),
+        one=columns.__getitem__,
+        relation_settings=RelationSettings(),
+    )
+    wide = sigma > CLEAR_MOTION_SIGMA * np.hypot(*SIZE)
     expected = np.where((moving(facts) == YES) & wide, NO, moving(facts))
     assert moving_clearly(facts).tolist() == expected.tolist()
     assert np.all((moving_clearly(facts) == MAYBE) == np.isnan(speed))

@@ -42,7 +42,7 @@ def asked(mind: Mind, name: str) -> np.ndarray:
 
 
 @given(st.floats(0.0, 179.0), st.floats(0.0, 179.0))
-def test_bars_lie_as_they_were_laid_and_are_as_far_apart_in_angle(a: float, b: float) -> None:
+def test_orientation_and_angle_of_bars_are_measured(a: float, b: float) -> None:
     mind = outlined(bar(a), bar(b))
     found = asked(mind, "orientation")[0]
     assert np.allclose((found - [a, b] + 90) % 180, 90, atol=0.2)
@@ -56,7 +56,7 @@ def test_bars_lie_as_they_were_laid_and_are_as_far_apart_in_angle(a: float, b: f
         assert truth == 0
 
 
-def test_what_is_round_or_out_of_sight_lies_no_way() -> None:
+def test_round_or_hidden_objects_have_no_orientation() -> None:
     mind = outlined(bar(30, 40, 40), bar(30))
     assert asked(mind, "orientation")[:, 0].tolist() == [-inf, inf]
     assert asked(mind, "axis_angle")[:, 0, 1].tolist() == [-inf, inf]
@@ -66,12 +66,12 @@ def test_what_is_round_or_out_of_sight_lies_no_way() -> None:
     assert asked(hidden, "openness")[:, 1].tolist() == [-inf, inf]
 
 
-def test_open_jaws_leave_more_of_their_hull_free_than_closed_ones() -> None:
+def test_open_jaws_have_greater_openness_than_closed_ones() -> None:
     mind = outlined(np.array(JAWS), np.array(CLOSED))
     assert asked(mind, "openness")[0] == pytest.approx([0.5, 0.0], abs=0.01)
 
 
-def test_what_lies_against_another_shares_an_outline_with_it() -> None:
+def test_adjacent_objects_share_an_outline() -> None:
     mind = mind_of((100, 100, 60, 60), (300, 110, 40, 40), (500, 100, 40, 40))
     beside = box_region(2, (160.0, 110.0, 40.0, 40.0))
     assert beside is not None

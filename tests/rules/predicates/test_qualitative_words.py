@@ -61,7 +61,7 @@ def told(facts: Snapshot, word: str, a: int, b: int) -> list[str]:
 
 @settings(max_examples=60, deadline=None)
 @given(boxes, boxes, boxes)
-def test_one_relation_of_allen_holds_along_each_axis_and_they_compose(
+def test_exactly_one_allen_relation_holds_along_each_axis_and_they_compose(
     a: tuple[tuple[int, int], tuple[int, int]],
     b: tuple[tuple[int, int], tuple[int, int]],
     c: tuple[tuple[int, int], tuple[int, int]],
@@ -83,7 +83,7 @@ places = st.tuples(st.integers(1, 28), st.integers(1, 20))
 
 @settings(max_examples=100, deadline=None)
 @given(places, places, places)
-def test_tpcc_is_its_definition_but_near_the_straight_lines(
+def test_tpcc_equals_its_definition_except_near_straight_lines(
     a: tuple[int, int], b: tuple[int, int], c: tuple[int, int]
 ) -> None:
     assume(len({a, b, c}) == 3)
@@ -109,7 +109,7 @@ def turned(
     return about[0] + moved.real, about[1] + moved.imag
 
 
-def test_what_is_out_of_sight_is_in_no_known_relation() -> None:
+def test_relations_of_hidden_objects_are_unknown() -> None:
     seen = mind_of((0, 0, 20, 20), (50, 50, 20, 20), (100, 0, 20, 20))
     facts = Snapshot(seen.with_objects(replace(seen.objects[2], presence=Presence.HIDDEN)))
     assert PREDICATES["along_x"].evaluate(facts, "before")[0, 1] == MAYBE
@@ -117,7 +117,7 @@ def test_what_is_out_of_sight_is_in_no_known_relation() -> None:
     assert PREDICATES["tpcc"].evaluate(facts, "csf")[0, 1, 2] == MAYBE
 
 
-def test_rules_ask_for_them_by_name() -> None:
+def test_rules_name_qualitative_relations() -> None:
     (rule,) = parse_rules(
         "rule r(a, b, c): info\n when along_x(before, a, b) and tpcc(dsf, a, b, c)\n"
         ' say "{a} {b} {c}"'
@@ -133,7 +133,7 @@ def test_rules_ask_for_them_by_name() -> None:
             )
 
 
-def test_every_relation_has_its_signs() -> None:
+def test_every_allen_relation_has_distinct_signs() -> None:
     assert set(_SIGNS) == set(ALLEN_RELATIONS)
     assert len(set(_SIGNS.values())) == 13
     assert len(TPCC_RELATIONS) == len(set(TPCC_RELATIONS)) == 25

@@ -36,7 +36,7 @@ def first_met(likely: Floats) -> list[list[int]]:
 
 @settings(max_examples=150, deadline=None)
 @given(st.integers(0, 4), st.data())
-def test_quantities_of_pairs_are_those_of_plain_arrays(n: int, data: st.DataObject) -> None:
+def test_pair_quantities_equal_plain_numpy(n: int, data: st.DataObject) -> None:
     cells = st.lists(NUMBERS, min_size=n * n, max_size=n * n)
     gap, rate, sigma, relative = (
         np.array(data.draw(cells), dtype=float).reshape(n, n) for _ in range(4)

@@ -45,12 +45,14 @@ def path(shift: tuple[float, float]) -> Floats:
 
 
 @given(st.integers(1, 4))
-def test_what_rests_sets_out_nowhere(bodies: int) -> None:
+def test_resting_bodies_do_not_move(bodies: int) -> None:
     assert not advancing_outlines(window(resting(bodies)), LIMIT).any()
 
 
 @given(st.integers(2, 4), shifts)
-def test_what_all_do_alike_is_the_cameras_doing(bodies: int, shift: tuple[float, float]) -> None:
+def test_motion_common_to_all_bodies_is_due_to_the_camera(
+    bodies: int, shift: tuple[float, float]
+) -> None:
     seen = window(resting(bodies) + path(shift)[:, None])
     assert not advancing_outlines(seen, LIMIT).any()
     if np.hypot(*shift) > 1.0:
@@ -58,7 +60,7 @@ def test_what_all_do_alike_is_the_cameras_doing(bodies: int, shift: tuple[float,
 
 
 @given(st.integers(1, 4), st.integers(0, 3), shifts)
-def test_one_that_goes_far_enough_is_the_one_that_sets_out(
+def test_only_the_body_that_moves_far_enough_sets_out(
     bodies: int, who: int, shift: tuple[float, float]
 ) -> None:
     reach, who = resting(bodies), who % bodies
@@ -79,26 +81,26 @@ def test_the_order_of_bodies_does_not_matter(order: list[int], shift: tuple[floa
         assert np.array_equal(question(turned), question(seen)[order])
 
 
-def test_a_part_that_reaches_out_is_enough() -> None:
+def test_an_advancing_part_of_a_body_suffices() -> None:
     reach = resting(3)
     reach[6:, 0, 3] += 10.0
     assert advancing_outlines(window(reach), LIMIT).tolist() == [True, False, False]
 
 
-def test_what_something_else_begins_to_cover_sets_out_nowhere() -> None:
+def test_a_body_being_covered_does_not_move() -> None:
     reach = resting(3)
     reach[6:, 0, 3:6] -= 15.0
     assert not advancing_outlines(window(reach), LIMIT).any()
 
 
-def test_what_is_cut_by_the_border_tells_nothing() -> None:
+def test_parts_cut_by_the_border_are_no_evidence_of_motion() -> None:
     reach, free = resting(2), np.ones((len(TIMES), 2, FAN))
     reach[6:, 0, 3] += 10.0
     free[:, 0, 3] = 0.0
     assert not advancing_outlines(window(reach, free), LIMIT).any()
 
 
-def test_a_history_that_is_too_short_tells_nothing() -> None:
+def test_a_short_history_shows_no_motion() -> None:
     reach = resting(2)[:3]
     reach[2, 0] += 30.0
     assert not advancing_outlines(window(reach), LIMIT).any()

@@ -42,26 +42,26 @@ def test_a_trend_is_known_a_quarter_of_a_second_after_its_onset(rate: float, tre
     assert new_trend(mind(rate), other, (1, 2)) is None
 
 
-def test_slow_changes_and_the_sway_of_what_is_carried_are_none() -> None:
+def test_slow_changes_and_the_sway_of_carried_bodies_are_not_trends() -> None:
     assert new_trend(mind(5.0), "diverging", (1, 2)) is None
     assert new_trend(mind(90.0, speed=300.0), "diverging", (1, 2)) is not None
     assert new_trend(mind(90.0, speed=500.0), "diverging", (1, 2)) is None
 
 
-def test_nothing_is_known_of_strangers_or_of_one_alone() -> None:
+def test_no_trend_for_unknown_bodies_or_a_single_one() -> None:
     assert new_trend(mind(90.0), "diverging", (1, 7)) is None
     assert new_trend(mind(90.0), "diverging", (1,)) is None
     assert new_trend(Mind(time=NOW), "diverging", (1, 2)) is None
 
 
-def test_a_trend_ends_when_the_opposite_sets_in() -> None:
+def test_a_trend_ends_when_its_opposite_sets_in() -> None:
     trends = NewTrends(mind(90.0))
     assert trends.has_opposite(Relation("converging", (1, 2), Truth.TRUE, 0.0))
     assert not trends.has_opposite(Relation("diverging", (1, 2), Truth.TRUE, 0.0))
     assert not trends.has_opposite(Relation("touching", (1, 2), Truth.TRUE, 0.0))
 
 
-def test_an_action_begins_by_it_but_does_not_hold_yet() -> None:
+def test_a_new_trend_begins_an_action_that_does_not_hold_yet() -> None:
     seen = observe(ACTIONS["diverging"], (1, 2), RelationLookup(mind(90.0)))
     assert seen.entry is seen.new_trend is not None
     assert seen.held_by is seen.helps is None
@@ -75,7 +75,7 @@ def test_an_action_begins_by_it_but_does_not_hold_yet() -> None:
     ("speeds", "begins"),
     [((0.0, 90.0), False), ((90.0, 0.0), True), ((0.0, 0.0), True), ((np.nan, 90.0), True)],
 )
-def test_who_is_named_first_comes_or_the_trend_must_last(
+def test_the_first_actor_must_move_for_a_new_trend_to_count(
     speeds: tuple[float, float], begins: bool
 ) -> None:
     """Of an arm that bends, hardly any speed is seen; so only who rests while the other moves waits."""
@@ -92,7 +92,7 @@ def passing(relative_speed: float) -> Mind:
     return mind(relative_speed, relations=(met, Relation("passing_by", (1, 2), Truth.TRUE, 0.3)))
 
 
-def test_who_has_come_to_rest_no_longer_passes_by() -> None:
+def test_a_body_at_rest_no_longer_passes_by() -> None:
     lookup = RelationLookup(passing(100.0))
     assert lookup.find("touching", (1, 2)).truth is Truth.UNKNOWN
     before = lookup.memory(NO_PAUSES, carry=False)

@@ -71,7 +71,7 @@ BEFORE = OutlineContact(0.0, passing=False, motion_known=True, in_front=True)
         (False, 0.0, BEFORE, Truth.FALSE, True),  # and let go of
     ],
 )
-def test_outlines_that_meet(
+def test_outlines_that_meet_while_passing(
     held: bool, gap: float, contact: OutlineContact, passing_by: Truth, past: bool
 ) -> None:
     mind = scene(held, gap, contact, passing_by)
@@ -92,12 +92,12 @@ def gone(place: Callable[[float], tuple[float, float]], until: float) -> Mind:
     ("since", "past"),
     [(2.5, True), (0.5, False)],  # while it passed, and long before the path that is remembered
 )
-def test_who_goes_past_recedes_from_then_on(since: float, past: bool) -> None:
+def test_a_body_that_went_past_recedes_from_then_on(since: float, past: bool) -> None:
     mind = gone(lambda t: (80 + 110 * t, 120), 3.2)
     assert went_past(mind, Relation("diverging", (PART, TARGET), Truth.TRUE, since)) is past
 
 
-def test_nobody_has_gone_past_of_whom_no_path_is_known() -> None:
+def test_a_body_without_known_path_has_not_gone_past() -> None:
     mind = Mind(frame_size=(640, 480))
     assert not went_past(mind, Relation("diverging", (PART, TARGET), Truth.TRUE, 0.0))
 
@@ -110,7 +110,7 @@ def test_nobody_has_gone_past_of_whom_no_path_is_known() -> None:
         (lambda t: (255, 220), False),  # it has gone nowhere: nothing is known
     ],
 )
-def test_who_went_round_another_did_so_also_after_he_has_stopped(
+def test_going_round_still_counts_after_the_body_has_stopped(
     place: Callable[[float], tuple[float, float]], round_it: bool
 ) -> None:
     mind = gone(place, 3.2)
@@ -120,9 +120,7 @@ def test_who_went_round_another_did_so_also_after_he_has_stopped(
 
 
 @pytest.mark.parametrize(("falls", "put"), [(False, True), (True, False)])
-def test_what_rested_when_its_carrier_left_was_put_down_and_what_fell_was_not(
-    falls: bool, put: bool
-) -> None:
+def test_a_resting_part_was_put_down_and_a_falling_one_was_not(falls: bool, put: bool) -> None:
     def at(i: int) -> Observation:
         t = i / 25
         carried = 100 + 60 * min(t, 2.0)
@@ -140,7 +138,7 @@ def test_what_rested_when_its_carrier_left_was_put_down_and_what_fell_was_not(
 
 
 @pytest.mark.parametrize(("coupled", "against"), [(True, False), (False, True)])
-def test_outlines_of_what_is_coupled_drift_and_it_moves_together(
+def test_coupled_bodies_move_together_though_their_outlines_drift(
     coupled: bool, against: bool
 ) -> None:
     """A cart is hauled, and its outline creeps nearer to that of the tug."""
@@ -161,7 +159,7 @@ def test_outlines_of_what_is_coupled_drift_and_it_moves_together(
         (1.5, "moving_together", False),
     ],
 )
-def test_what_has_come_apart_is_carried_no_longer(
+def test_separated_bodies_are_not_carried(
     decoupled_at: float | None, true: str, left: bool
 ) -> None:
     pair = (GRIPPER, PART)
@@ -174,7 +172,7 @@ def test_what_has_come_apart_is_carried_no_longer(
     assert observe(ACTIONS["converging"], pair, RelationLookup(mind)).contrary is None
 
 
-def test_what_rests_does_not_go_past() -> None:
+def test_a_resting_body_does_not_go_past() -> None:
     assert not goes_past(scene(False, 0.0, ON, Truth.TRUE), (PART, TARGET), lambda _: True)
 
 
@@ -187,7 +185,7 @@ def test_what_rests_does_not_go_past() -> None:
         (OutlineContact(0.0, confirmed_since=1.0, motion_known=True), False),
     ],
 )
-def test_a_stage_of_contact_waits_until_one_has_slowed_down(
+def test_a_contact_stage_begins_when_a_body_has_slowed_down(
     contact: OutlineContact, on: bool
 ) -> None:
     assert moves_on(scene(False, 0.0, contact, Truth.FALSE), (PART, TARGET)) is on
@@ -201,19 +199,17 @@ def test_a_stage_of_contact_waits_until_one_has_slowed_down(
         (OutlineContact(1.0, changed_at=2.5, passing=True, motion_known=True), -math.inf),
     ],
 )
-def test_a_contact_counts_from_when_one_ceased_to_pass(
-    contact: OutlineContact, since: float
-) -> None:
+def test_a_contact_counts_from_the_end_of_passing(contact: OutlineContact, since: float) -> None:
     assert stopped_at(scene(False, 0.0, contact, Truth.FALSE), (PART, TARGET)) == since
     assert stopped_at(scene(False, 0.0, contact, Truth.FALSE), (GRIPPER, TARGET)) == -math.inf
 
 
-def test_where_nothing_is_known_of_a_contact_nobody_moves_on() -> None:
+def test_nobody_moves_on_if_the_contact_is_unknown() -> None:
     mind = scene(False, 0.0, ON, Truth.FALSE)
     assert not moves_on(mind, (GRIPPER, TARGET))
 
 
-def test_a_contact_in_passing_neither_holds_nor_begins_in_a_stage() -> None:
+def test_a_passing_contact_neither_holds_nor_begins_a_stage() -> None:
     contact = Relation("touching", (PART, TARGET), Truth.TRUE, 1.0)
     seen = ActionObservation(
         holds=Truth.TRUE, held_by=contact, helps=contact, entry=contact, observed=True
@@ -237,7 +233,7 @@ def falling(index: int, *, down: float) -> list[Region | None]:
 
 
 @pytest.mark.parametrize(("down", "into"), [(2.9, True), (0.0, False)])
-def test_what_came_to_a_body_that_hides_it_has_vanished_into_it(down: float, into: bool) -> None:
+def test_a_body_hidden_by_its_goal_has_vanished_into_it(down: float, into: bool) -> None:
     thoughts = reason(seen(i, falling(i, down=down)) for i in range(100))
     mind = thoughts[-1].mind
     assert mind.objects[PART].presence is Presence.HIDDEN
@@ -260,7 +256,7 @@ def test_what_came_to_a_body_that_hides_it_has_vanished_into_it(down: float, int
         ([(0.0, 300.0, 100.0), (1.0, 360.0, 180.0)], False),  # seen too shortly
     ],
 )
-def test_only_what_comes_to_a_body_vanishes_into_it(
+def test_only_an_approaching_body_vanishes_into_another(
     path: list[tuple[float, float, float]], came: bool
 ) -> None:
     body, other = (

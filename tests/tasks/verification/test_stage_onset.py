@@ -39,26 +39,26 @@ def onset(*steps: Leaf[StepMonitor], window: SampleWindow) -> float:
 
 @pytest.mark.parametrize("action", ["diverging", "decoupled"])
 @pytest.mark.parametrize("at", [9.0, 9.4])
-def test_a_departure_is_dated_to_the_moment_of_setting_off(action: str, at: float) -> None:
+def test_a_departure_is_dated_to_its_motion_onset(action: str, at: float) -> None:
     seen = step(action, "diverging", 9.8)
     assert onset(seen, window=departing(at)) == pytest.approx(at)
 
 
-def test_without_samples_the_relation_tells() -> None:
+def test_without_samples_the_relation_dates_the_stage() -> None:
     assert onset(step("diverging", "diverging", 9.8), window=SampleWindow()) == 9.8
     assert onset(step("coupled", "coupled", 9.1), window=SampleWindow()) == 9.1
 
 
-def test_a_contact_and_what_was_not_observed_are_not_dated_back() -> None:
+def test_contacts_and_unobserved_actions_are_not_dated_back() -> None:
     for seen in (step("touching", "touching", 9.5), step("diverging", None, None)):
         assert onset(seen, window=departing(9.0)) == NOW
 
 
-def test_what_only_leads_to_a_step_does_not_date_it() -> None:
+def test_helping_relations_do_not_date_a_step() -> None:
     assert onset(step("touching", "converging", 9.0), window=SampleWindow()) == NOW
 
 
-def test_a_stage_begins_with_the_last_of_its_steps() -> None:
+def test_a_stage_begins_with_the_last_of_its_actions() -> None:
     both = step("coupled", "coupled", 8.0), step("diverging", "diverging", 9.8)
     assert onset(*both, window=departing(9.4)) == pytest.approx(9.4)
     late_contact = step("coupled", "coupled", 8.0), step("touching", "touching", 9.7)

@@ -101,7 +101,7 @@ class ConditionJudge:
         rule = self.pattern.rule
         assignment = dict(zip(rule.variables, objects, strict=True))
         for call in compile_rules((rule,)).related(rule):
-            found = mind.relation(call.name, *(assignment[w] for w in call.words))
+            found = mind.relation(call.name, *(assignment[w] for w in call.arguments))
             if found is not None and found.truth is Truth.TRUE and self.last is not None:
                 at = objects, self.last.number
                 self.confidences[at] = min(self.confidences.get(at, 1.0), found.confidence)

@@ -97,7 +97,7 @@ class PossibleTimes:
 def possible_times(formula: Formula) -> PossibleTimes | None:
     """When a formula may be true; None for always."""
     match formula:
-        case Predicate(name=name, words=(a, b)) if name in RELATION_NAMES and a != b:
+        case Predicate(name=name, arguments=(a, b)) if name in RELATION_NAMES and a != b:
             return _relation(name, a, b)
         case And(parts=parts):
             found = [p for p in map(possible_times, parts) if p is not None]

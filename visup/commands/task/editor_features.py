@@ -174,7 +174,7 @@ def signature(ls: LanguageServer, params: lsp.SignatureHelpParams) -> lsp.Signat
 def _takes(document: TextDocument, name: str) -> tuple[tuple[str, ...], str] | None:
     if holds_rules(document):
         word = PREDICATES.get(name) or QUANTITIES.get(name)
-        return (word.takes, word.meaning) if word else None
+        return (word.argument_kinds, word.meaning) if word else None
     action = known_actions().get(name)
     return (action.kinds, action.about) if action else None
 

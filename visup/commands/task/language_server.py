@@ -115,7 +115,7 @@ def _rule_meaning(document: TextDocument, word: NameUse) -> str | None:
     if entry := KEYWORDS.get(word.name) or FUNCTIONS.get(word.name):
         return f"`{entry[0]}`: {entry[1]}"
     known = PREDICATES.get(word.name) or QUANTITIES.get(word.name)
-    return f"`{word.name}({', '.join(known.takes)})`: {known.meaning}" if known else None
+    return f"`{word.name}({', '.join(known.argument_kinds)})`: {known.meaning}" if known else None
 
 
 def _show_meaning(ls: LanguageServer, params: lsp.HoverParams) -> lsp.Hover | None:

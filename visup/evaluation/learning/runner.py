@@ -17,7 +17,7 @@ from visup.evaluation.figures import Progress, silent, sums_of
 from visup.evaluation.learning.worlds import world_minds
 from visup.evaluation.workers import each_in_processes
 from visup.render.worlds.kinds.catalogue import KINDS, known_kinds, random_world
-from visup.rules.predicates.vocabulary import IMPLIED
+from visup.rules.predicates.vocabulary import IMPLIED_BY
 from visup.tasks import parse_task
 from visup.tasks.analysis.judging import judged
 from visup.tasks.analysis.languages import ActorsAction, actions_of
@@ -176,5 +176,5 @@ def beyond(some: set[ActorsAction], others: set[ActorsAction]) -> set[ActorsActi
     return {
         (name, actors)
         for name, actors in some
-        if not any((n, actors) in others for n in IMPLIED.get(name, frozenset({name})))
+        if not any((n, actors) in others for n in IMPLIED_BY.get(name, frozenset({name})))
     }

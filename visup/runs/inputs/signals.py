@@ -76,7 +76,7 @@ def _used_signals(rules: Iterable[Rule], tasks: Iterable[Task]) -> Iterator[tupl
     for rule in rules:
         for call in (c for f in rule.formulas for c in calls(f) if c.name in SIGNAL_WORDS):
             if call.name != "signal_known":
-                yield call.words[0], f"rule '{rule.name}'", rule.file
+                yield call.arguments[0], f"rule '{rule.name}'", rule.file
     for task in tasks:
         for name in signals_named(task):
             yield name, f"task `{task.name}`", task.file
