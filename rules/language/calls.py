@@ -18,7 +18,7 @@ from visup.rules.predicates.arguments import (
     rearranged_call,
     with_distinct_words,
 )
-from visup.rules.predicates.vocabulary import Vocabulary
+from visup.rules.predicates.definitions import Vocabulary
 
 Call = Predicate | Measure
 _KNOWN = ("known", "is_known", "available", "is_available", "has_value")

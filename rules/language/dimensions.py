@@ -30,7 +30,7 @@ from visup.rules.formula.units import (
     units_of,
 )
 from visup.rules.language.transform import Fault
-from visup.rules.predicates.vocabulary import Vocabulary
+from visup.rules.predicates.definitions import Vocabulary
 
 
 def check_dimensions(node: Comparison, vocabulary: Vocabulary) -> Iterator[Fault]:

@@ -34,7 +34,8 @@ from visup.rules.language.repair import (
 )
 from visup.rules.language.transform import read_tree
 from visup.rules.language.typecheck import TypeChecker
-from visup.rules.predicates.vocabulary import RULES, Vocabulary
+from visup.rules.predicates.definitions import Vocabulary
+from visup.rules.predicates.vocabulary import RULES
 
 CHARACTERS_TRIED = 200_000
 """Characters parsed to find repairs of one file; errors beyond this budget get no hints."""

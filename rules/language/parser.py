@@ -21,7 +21,8 @@ from visup.rules.language.error_recovery import (
 )
 from visup.rules.language.fixes import pointing
 from visup.rules.language.typecheck import TypeChecker
-from visup.rules.predicates.vocabulary import RULES, Vocabulary
+from visup.rules.predicates.definitions import Vocabulary
+from visup.rules.predicates.vocabulary import RULES
 
 _HEAD = re.compile(r"^[ \t]*rule\b", re.MULTILINE)
 

@@ -46,7 +46,8 @@ from visup.rules.language.dimensions import (
 from visup.rules.language.keywords import KEYWORDS
 from visup.rules.language.transform import Fault
 from visup.rules.monitoring.cost import MAX_STATE, MAX_VARIABLES, cost_of, variables_of
-from visup.rules.predicates.vocabulary import RULES, Vocabulary
+from visup.rules.predicates.definitions import Vocabulary
+from visup.rules.predicates.vocabulary import RULES
 from visup.rules.wording.sentences import mentions
 
 

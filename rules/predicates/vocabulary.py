@@ -1,9 +1,8 @@
-"""The vocabulary of the rule language: arguments, evaluation and meaning of each word."""
+"""The vocabulary of the rule language: arguments, evaluation and meaning of each predicate and quantity."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from operator import attrgetter
 from types import MappingProxyType
 from typing import Any
@@ -20,7 +19,6 @@ from visup.rules.formula.units import (
     SHARE,
     SPEED,
     TIME,
-    Dimension,
 )
 from visup.rules.predicates import certainty
 from visup.rules.predicates import image_quantities as image
@@ -28,6 +26,7 @@ from visup.rules.predicates import outline_quantities as outline
 from visup.rules.predicates import signals as signal_words
 from visup.rules.predicates._snapshot_jit import CLOSING, CONTACT, GAP, RELATIVE
 from visup.rules.predicates.coarse_relations import COARSE_RELATIONS
+from visup.rules.predicates.definitions import PredicateDefinition, QuantityDefinition, Vocabulary
 from visup.rules.predicates.motion import moving, moving_clearly
 from visup.rules.predicates.qualitative_words import allen_evaluator, tpcc_codes
 from visup.rules.predicates.snapshot import (
@@ -57,64 +56,6 @@ IMPLIED_BY = MappingProxyType(
 PERCEPT_KINDS = ("region", "hypothesis", "depth", "health")
 
 SURE_POSE = 0.6  # least confidence of a pose for its spin to count
-
-
-@dataclass(frozen=True, slots=True)
-class PredicateDefinition:
-    """A predicate of the rule language: true, false or unknown.
-
-    Attributes:
-        argument_kinds: Kinds of its arguments: 'object', 'relation', 'kind', 'name', 'zone', 'signal',
-            'word',
-            'allen' or 'tpcc' (relations of these calculi).
-        evaluate: Its evaluation: codes of all objects, one dimension per argument 'object', in order; the
-            other arguments are passed as words.
-        meaning: Its meaning in one clause.
-    """
-
-    argument_kinds: tuple[str, ...]
-    evaluate: Callable[..., Codes]
-    meaning: str
-
-
-@dataclass(frozen=True, slots=True)
-class QuantityDefinition:
-    """A quantity of the rule language.
-
-    Attributes:
-        argument_kinds: Kinds of its arguments.
-        dimension: Its dimension.
-        evaluate: Its intervals in the base unit, (2, ...), for all objects.
-        meaning: Its meaning in one clause.
-        plain: Whether it is a plain number instead of a share.
-    """
-
-    argument_kinds: tuple[str, ...]
-    dimension: Dimension
-    evaluate: Callable[..., Floats]
-    meaning: str
-    plain: bool = False
-
-    @property
-    def unit(self) -> str:
-        """The unit in which it is shown; empty for a plain number."""
-        if self.plain:
-            return ""
-        units = {TIME: "s", LENGTH: "px", SPEED: "px/s", ANGULAR_SPEED: "deg/s", SHARE: "%"}
-        return {**units, ANGLE: "deg", REAL_LENGTH: "m"}[self.dimension]
-
-
-@dataclass(frozen=True, slots=True)
-class Vocabulary:
-    """The names available in formulas.
-
-    Attributes:
-        predicates: Relations and facts.
-        quantities: Numbers.
-    """
-
-    predicates: Mapping[str, PredicateDefinition]
-    quantities: Mapping[str, QuantityDefinition]
 
 
 def expected(facts: Snapshot, name: str) -> Codes:

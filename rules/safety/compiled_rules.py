@@ -27,8 +27,9 @@ from visup.rules.monitoring.early import EarlyCompiler
 from visup.rules.monitoring.linker import LinkedProgram
 from visup.rules.monitoring.states import States
 from visup.rules.monitoring.vm import CHOICE_BITS, Ints, bits
+from visup.rules.predicates.definitions import PredicateDefinition, QuantityDefinition
 from visup.rules.predicates.snapshot import RELATION_NAMES, Snapshot
-from visup.rules.predicates.vocabulary import RULES, PredicateDefinition, QuantityDefinition
+from visup.rules.predicates.vocabulary import RULES
 from visup.rules.relations.reasoner import NAMES
 
 AlarmKey = tuple[str, frozenset[int]]
