@@ -14,32 +14,32 @@ from typing import Any
 
 def lazy_names(
     package: str,
-    homes: Mapping[str, tuple[str, ...]],
+    names_of_module: Mapping[str, tuple[str, ...]],
     before: Callable[[str], object] | None = None,
 ) -> Callable[[str], Any]:
     """A package's `__getattr__` (PEP 562).
 
     Args:
         package: Name of the package.
-        homes: Module -> the names it provides; `Name as Other` renames one.
+        names_of_module: Module -> the names it provides; `Name as Other` renames one.
         before: Called with the name of a module before it is imported.
 
     Returns:
         A function that loads a name and caches it in the package; raises AttributeError for unknown names.
     """
-    home_of = {
+    location_of = {
         name.rpartition(" as ")[2]: (module, name.partition(" as ")[0])
-        for module, names in homes.items()
+        for module, names in names_of_module.items()
         for name in names
     }
 
     def find(name: str) -> Any:
-        if name not in home_of:
+        if name not in location_of:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        module, there = home_of[name]
+        module, attribute = location_of[name]
         if before is not None:
             before(module)
-        found = getattr(import_module(module), there)
+        found = getattr(import_module(module), attribute)
         setattr(sys.modules[package], name, found)
         return found
 

@@ -69,7 +69,9 @@ class Contract:
                 where="contract",
                 expected="a word of letters, digits and underscores, such as 'lamp'",
             )
-        self._expect("version", self.version == CONTRACT_VERSION, f"{CONTRACT_VERSION}", _VERSION)
+        self._expect(
+            "version", self.version == CONTRACT_VERSION, f"{CONTRACT_VERSION}", _OTHER_VERSION
+        )
         for field in ("gives", "needs", "relieves"):
             kinds = getattr(self, field)
             object.__setattr__(self, field, tuple(kinds) if isinstance(kinds, list) else kinds)
@@ -121,12 +123,12 @@ class Contract:
             )
 
 
-_VERSION = "this behaviour was written for another version of visup; see docs/plugins.md"
+_OTHER_VERSION = "this behaviour was written for another version of visup; see docs/plugins.md"
 
 
 def _is_number_from(value: object, least: float) -> bool:
-    plain = isinstance(value, int | float) and not isinstance(value, bool)
-    return plain and isfinite(value) and value >= least  # type: ignore[arg-type, operator]
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return is_number and isfinite(value) and value >= least  # type: ignore[arg-type, operator]
 
 
 def _is_integer_in(value: object, least: int, most: int) -> bool:

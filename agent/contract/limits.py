@@ -29,34 +29,34 @@ class Limits:
     Attributes:
         hang_s: A run that takes longer is abandoned, seconds. None runs behaviours in the caller's thread
             without any limit: for debuggers and profilers.
-        patient: Whether a contract may request a longer `hang_s`, for compilation in its first runs. Not for
-            live sources, where a hang must be reported soon.
+        longer_hangs: Whether a contract may request a longer `hang_s`, for compilation in its first runs;
+            not for live sources, where a hang must be reported soon.
         start_s: Time for a behaviour to start (import libraries, load models), seconds.
         budgets: Whether the contract's `cost_ms` limits each run as well.
         budget_ms: Budget of behaviours that declare none, milliseconds.
         memory_mb: Memory limit of behaviours that declare none, megabytes.
         isolate: Names of behaviours that run in their own processes, whatever their contracts say.
-        here: Whether all run in this process, whatever contracts say: for debuggers and checkers.
-        wakeful: Names of behaviours that never sleep, whatever their contracts say: those that safety
+        in_process: Whether all run in this process, whatever contracts say: for debuggers and checkers.
+        never_asleep: Names of behaviours that never sleep, whatever their contracts say: those that safety
             rules need (`rules/activation/activation.py`).
         clock: Clock for the time of a run, seconds.
     """
 
     hang_s: float | None = 60.0
-    patient: bool = True
+    longer_hangs: bool = True
     start_s: float = 60.0
     budgets: bool = False
     budget_ms: float = 1000.0
     memory_mb: float = 2048.0
     isolate: frozenset[str] = frozenset()
-    here: bool = False
-    wakeful: frozenset[str] = frozenset()
+    in_process: bool = False
+    never_asleep: frozenset[str] = frozenset()
     clock: Callable[[], float] = time.perf_counter
 
     def seconds(self, contract: Contract) -> float | None:
         """Time limit of one run, seconds; None for no limit."""
         if not self.budgets:
-            if self.hang_s is None or not self.patient:
+            if self.hang_s is None or not self.longer_hangs:
                 return self.hang_s
             return max(self.hang_s, contract.hang_s or 0.0)
         budget = (contract.cost_ms or self.budget_ms) / 1000.0
@@ -64,7 +64,7 @@ class Limits:
 
     def sleeps(self, contract: Contract) -> bool:
         """Whether it runs only while it is awake."""
-        return bool(contract.awake) and contract.name not in self.wakeful
+        return bool(contract.awake) and contract.name not in self.never_asleep
 
     def megabytes(self, contract: Contract) -> float:
         """Memory limit, megabytes."""
@@ -72,4 +72,4 @@ class Limits:
 
     def isolated(self, contract: Contract) -> bool:
         """Whether it runs in its own process."""
-        return not self.here and (contract.isolate or contract.name in self.isolate)
+        return not self.in_process and (contract.isolate or contract.name in self.isolate)

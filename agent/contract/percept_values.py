@@ -41,9 +41,13 @@ def check_value(kind: str, value: Any, size: tuple[int, int], who: str) -> None:
     if check is None:
         _check_plain(value, who)
         return
-    kind_type, judge = check
-    expect(isinstance(value, kind_type), f"{who} as {a_kind(value)}", _a_type(kind_type))
-    judge(value, size)
+    kind_type, check_of_kind = check
+    expect(
+        isinstance(value, kind_type),
+        f"{who} as {type_with_article(value)}",
+        _with_article(kind_type),
+    )
+    check_of_kind(value, size)
 
 
 def _region(r: Region, size: tuple[int, int]) -> None:
@@ -88,8 +92,8 @@ def _hypothesis(h: Hypothesis, size: tuple[int, int]) -> None:
     expect(_is_integer(h.view), f"{who} has view {brief(h.view)}", "the number of a view")
     expect(_is_share(h.similarity), f"{who} has similarity {brief(h.similarity)}", "0 to 1")
     for name, value in (("rotation", h.rotation), ("scale", h.scale)):
-        fine = value is None or is_finite(value)
-        expect(fine, f"{who} has {name} {brief(value)}", "a finite number, or None")
+        valid = value is None or is_finite(value)
+        expect(valid, f"{who} has {name} {brief(value)}", "a finite number, or None")
     expect(isinstance(h.of_kind, bool), f"{who} has of_kind {brief(h.of_kind)}", "true or false")
     if h.direction is not None:
         _array(h.direction, f"{who}: direction", (3,))
@@ -113,8 +117,8 @@ def _camera(c: CameraMotion, size: tuple[int, int]) -> None:
 
 
 def _health(h: Health, size: tuple[int, int]) -> None:
-    fine = isinstance(h.status, HealthStatus) and isinstance(h.detail, str)
-    expect(fine, f"health has status {brief(h.status)}", "a HealthStatus and a sentence")
+    valid = isinstance(h.status, HealthStatus) and isinstance(h.detail, str)
+    expect(valid, f"health has status {brief(h.status)}", "a HealthStatus and a sentence")
 
 
 VALUE_CHECKS: Mapping[str, tuple[type, Callable[[Any, tuple[int, int]], None]]] = {
@@ -156,7 +160,7 @@ def _parts(value: object, who: str) -> Iterable[object]:
     if is_dataclass(value) and not isinstance(value, type):
         return [getattr(value, f.name) for f in fields(value)]
     raise BehaviourError(
-        f"{who} with {a_kind(value)} in it",
+        f"{who} with {type_with_article(value)} in it",
         expected="numbers, text, arrays, and lists, dicts or dataclasses of these",
     )
 
@@ -178,29 +182,29 @@ def _array(value: Any, who: str, shape: tuple[int | None, ...]) -> None:
         found = np.asarray(value)
     except ValueError:
         found = np.empty((), dtype=object)  # rows of different lengths
-    like = len(found.shape) == len(shape) and all(
-        wanted in (None, given) for wanted, given in zip(shape, found.shape, strict=True)
+    matches = len(found.shape) == len(shape) and all(
+        side in (None, found_side) for side, found_side in zip(shape, found.shape, strict=True)
     )
-    said = ", ".join("N" if n is None else str(n) for n in shape)
-    expect(like, f"{who} has shape {found.shape}", f"({said})")
+    expected_shape = ", ".join("N" if n is None else str(n) for n in shape)
+    expect(matches, f"{who} has shape {found.shape}", f"({expected_shape})")
     numbers = found.dtype.kind in "iuf" and bool(np.isfinite(found).all())
     expect(numbers, f"{who} contains a number that is not finite", "finite numbers")
 
 
-def expect(fine: bool, what: str, expected: str) -> None:
+def expect(condition: bool, what: str, expected: str) -> None:
     """Raise unless a condition holds.
 
     Raises:
         BehaviourError: It does not.
     """
-    if not fine:
+    if not condition:
         raise BehaviourError(what, expected=expected)
 
 
 def is_finite(value: object) -> bool:
     """Whether a value is a finite number."""
-    plain = isinstance(value, int | float | np.integer | np.floating)
-    return plain and not isinstance(value, bool) and math.isfinite(value)  # type: ignore[arg-type]
+    is_number = isinstance(value, int | float | np.integer | np.floating)
+    return is_number and not isinstance(value, bool) and math.isfinite(value)  # type: ignore[arg-type]
 
 
 def _is_at_least(value: object, least: float) -> bool:
@@ -212,16 +216,16 @@ def _is_share(value: object) -> bool:
 
 
 def _is_integer(value: object) -> bool:
-    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    return whole and abs(int(value)) < 2**63  # type: ignore[call-overload]
+    is_int = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    return is_int and abs(int(value)) < 2**63  # type: ignore[call-overload]
 
 
-def a_kind(value: object) -> str:
+def type_with_article(value: object) -> str:
     """The type of a value with its article."""
-    return "nothing (None)" if value is None else _a_type(type(value))
+    return "nothing (None)" if value is None else _with_article(type(value))
 
 
-def _a_type(kind: type) -> str:
+def _with_article(kind: type) -> str:
     return f"{'an' if kind.__name__[:1].lower() in 'aeiou' else 'a'} {kind.__name__}"
 
 

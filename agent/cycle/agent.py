@@ -122,8 +122,8 @@ class Agent:
         Returns:
             The complete record of the step; `mind` is now `Step.mind`.
         """
-        *_, (_, thought) = self.phases(observation, answers)
-        return self.act(observation, thought)
+        *_, (_, conclusions) = self.phases(observation, answers)
+        return self.act(observation, conclusions)
 
     def phases(
         self, observation: Observation, answers: Mapping[int, str] | None = None
@@ -164,29 +164,29 @@ class Agent:
                     return
             yield phase, outcome
 
-    def act(self, observation: Observation, thought: Outcome) -> Step:
+    def act(self, observation: Observation, conclusions: Outcome) -> Step:
         """The last phase: alerts and directives; the conclusions become the mind."""
-        conditions = (*thought.conditions, *fault_conditions(observation))
+        conditions = (*conclusions.conditions, *fault_conditions(observation))
         alerts, opened, closed = update_alerts(
             self.mind.alerts,
             conditions,
             observation.time,
             self._alerts_opened + 1,
-            thought.mind.unknown,
+            conclusions.mind.unknown,
         )
         self._alerts_opened += len(opened)
         events = (
-            *thought.events,
+            *conclusions.events,
             *alert_events(opened, closed, observation.time, observation.frame_index),
         )
         step = Step(
             frame_index=observation.frame_index,
             time=observation.time,
             observation=observation,
-            mind=replace(thought.mind, alerts=alerts),
+            mind=replace(conclusions.mind, alerts=alerts),
             events=events,
             alerts=(*opened, *closed),
-            directives=thought.directives,
+            directives=conclusions.directives,
         )
         self.mind, self.directives = step.mind, step.directives
         return step
@@ -196,10 +196,10 @@ class Agent:
         answers = MappingProxyType(dict(self._answers))
         return AgentSnapshot(self.mind, self.directives, self._alerts_opened, answers)
 
-    def restore(self, was: AgentSnapshot) -> None:
+    def restore(self, snapshot: AgentSnapshot) -> None:
         """Return to the beliefs of a snapshot, of this or another agent; behaviours are not affected."""
-        self.mind, self.directives = was.mind, was.directives
-        self._alerts_opened, self._answers = was.alerts_opened, dict(was.answers)
+        self.mind, self.directives = snapshot.mind, snapshot.directives
+        self._alerts_opened, self._answers = snapshot.alerts_opened, dict(snapshot.answers)
 
     def close(self) -> None:
         """Release the threads and processes of behaviours, which would also end with the agent itself."""
@@ -248,11 +248,11 @@ class Agent:
         Returns:
             `mind`, and `behaviours` by name, or None if one of them cannot save its state.
         """
-        whole = all(s.is_saveable for s in self._slots)
+        all_saveable = all(s.is_saveable for s in self._slots)
         saveable = {s.behaviour.contract.name: s.behaviour for s in self._slots if s.is_saveable}
         return {
             "mind": (self.mind, self.directives, self._alerts_opened, self._answers),
-            "behaviours": {n: _saved(b) for n, b in saveable.items()} if whole else None,
+            "behaviours": {n: _saved(b) for n, b in saveable.items()} if all_saveable else None,
             "slots": {s.behaviour.contract.name: s.state_dict() for s in self._slots},
         }
 
@@ -289,9 +289,11 @@ def _failed_outcome(
         key=name,
         needs=(),
     )
-    held = tuple(
+    current_conditions = tuple(
         AlertCondition(a.kind, a.objects, a.severity, a.cause, a.evidence, a.key, a.needs)
         for a in mind.alerts
     )
     unknown = frozenset(kind for r in observation.reports for kind in r.gives)
-    return Outcome(replace(mind, unknown=mind.unknown | unknown), (), (*held, condition))
+    return Outcome(
+        replace(mind, unknown=mind.unknown | unknown), (), (*current_conditions, condition)
+    )

@@ -9,10 +9,10 @@ from visup.agent.model.events import Alert, AlertCondition, Event, Severity
 from visup.agent.model.fast_replace import replace
 from visup.agent.model.records import FAULT_STATES, Observation, ReportState
 
-GRACE_S = 1.0
+CLOSING_DELAY_S = 1.0
 """Time without its condition after which an alert closes, seconds: alerts must not flicker."""
 
-SETTLE_S = 3.0
+RECOVERY_S = 3.0
 """Time that rules need to recover after a kind of percept was unknown, seconds; until then alerts that need
 it stay open."""
 
@@ -60,21 +60,21 @@ def update_alerts(
     Returns:
         Open alerts, newly opened ones, newly closed ones.
     """
-    opened_now = _by_key(conditions)
-    still: list[Alert] = []
+    pending = _by_key(conditions)
+    open_alerts: list[Alert] = []
     closed: list[Alert] = []
     for alert in alerts:
-        condition = opened_now.pop(_key(alert), None)
+        condition = pending.pop(_key(alert), None)
         if condition is not None:
-            still.append(_renew(alert, condition, time))
+            open_alerts.append(_renew(alert, condition, time))
             continue
-        silent = _unsure(alert, unknown, time)
-        if _is_over(silent, time):
-            closed.append(replace(silent, closed=time))
+        unrenewed = _unsure(alert, unknown, time)
+        if _is_over(unrenewed, time):
+            closed.append(replace(unrenewed, closed=time))
         else:
-            still.append(silent)
-    opened = tuple(_open(c, time, next_id + i) for i, c in enumerate(opened_now.values()))
-    return (*still, *opened), opened, tuple(closed)
+            open_alerts.append(unrenewed)
+    opened = tuple(_open(c, time, next_id + i) for i, c in enumerate(pending.values()))
+    return (*open_alerts, *opened), opened, tuple(closed)
 
 
 def alert_events(
@@ -82,11 +82,11 @@ def alert_events(
 ) -> tuple[Event, ...]:
     """The events of alerts that opened or closed."""
     opening_events = [_event("alert", a.cause, a, time, frame_index, a.severity) for a in opened]
-    over = [
+    closing_events = [
         _event("alert_closed", f"Resolved: {a.cause}", a, time, frame_index, Severity.INFO)
         for a in closed
     ]
-    return (*opening_events, *over)
+    return (*opening_events, *closing_events)
 
 
 def _event(
@@ -101,12 +101,12 @@ def _key(record: Alert | AlertCondition) -> Key:
 
 
 def _by_key(conditions: Iterable[AlertCondition]) -> dict[Key, AlertCondition]:
-    now: dict[Key, AlertCondition] = {}
+    found: dict[Key, AlertCondition] = {}
     for condition in conditions:
-        held = now.setdefault(_key(condition), condition)
-        if condition.severity > held.severity:
-            now[_key(condition)] = condition
-    return now
+        most_severe = found.setdefault(_key(condition), condition)
+        if condition.severity > most_severe.severity:
+            found[_key(condition)] = condition
+    return found
 
 
 def _open(condition: AlertCondition, time: float, number: int) -> Alert:
@@ -135,5 +135,5 @@ def _unsure(alert: Alert, unknown: frozenset[str], time: float) -> Alert:
 
 
 def _is_over(alert: Alert, time: float) -> bool:
-    settled = alert.unsure is None or time - alert.unsure > SETTLE_S
-    return settled and time - alert.updated > GRACE_S
+    recovered = alert.unsure is None or time - alert.unsure > RECOVERY_S
+    return recovered and time - alert.updated > CLOSING_DELAY_S

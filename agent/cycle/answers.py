@@ -15,8 +15,8 @@ from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
 Cast = Mapping[str, tuple[str, ...]]
 """Actor -> the models that it may be."""
 
-NOBODY_PLAYS: Cast = MappingProxyType({})
-NOBODY = ("unknown", UNKNOWN_OBJECT)
+NO_CAST: Cast = MappingProxyType({})
+NONE_OF_THE_MODELS = ("unknown", UNKNOWN_OBJECT)
 """Answers meaning that an object is none of the models."""
 
 
@@ -25,7 +25,7 @@ def resolve_answer(
     object_id: int,
     name: str,
     models: Iterable[str] = (),
-    cast: Cast = NOBODY_PLAYS,
+    cast: Cast = NO_CAST,
 ) -> str:
     """The model or actor that an answer means.
 
@@ -46,9 +46,9 @@ def resolve_answer(
     if belief is None:
         known = ", ".join(str(i) for i in sorted(mind.objects)) or "none yet"
         raise SettingsError(f"there is no object {object_id}", expected=f"one of: {known}")
-    own = [c.name for c in belief.candidates]
-    own += [n for q in mind.questions if q.object_id == object_id for n in q.names]
-    return resolve_model(mind, name, models, own, cast)
+    candidates = [c.name for c in belief.candidates]
+    candidates += [n for q in mind.questions if q.object_id == object_id for n in q.names]
+    return resolve_model(mind, name, models, candidates, cast)
 
 
 def resolve_model(
@@ -56,7 +56,7 @@ def resolve_model(
     name: str,
     models: Iterable[str] = (),
     own: Sequence[str] = (),
-    cast: Cast = NOBODY_PLAYS,
+    cast: Cast = NO_CAST,
 ) -> str:
     """The model or actor that a name means.
 
@@ -74,20 +74,25 @@ def resolve_model(
     Raises:
         SettingsError: There is no such name.
     """
-    said = " ".join(name.split())
-    if said in NOBODY:
+    given = " ".join(name.split())
+    if given in NONE_OF_THE_MODELS:
         return UNKNOWN_OBJECT
-    meant = {_normalised(m): m for m in _models(mind) | set(models)}
-    played = {**cast, **{a: found for a, found in mind.actors.items() if found}}
-    meant |= {_normalised(a): a if _shared(a, played) else _model(played[a], own) for a in played}
-    if _normalised(said) in meant:
-        return meant[_normalised(said)]
-    spelt = {_normalised(n): n for n in (*sorted(_models(mind) | set(models)), *played)}
-    near = closest(_normalised(said), spelt)
+    answers_by_name = {_normalised(m): m for m in _all_models(mind) | set(models)}
+    models_of_actor = {**cast, **{a: m for a, m in mind.actors.items() if m}}
+    for actor, of_actor in models_of_actor.items():
+        ambiguous = _is_ambiguous(actor, models_of_actor)
+        answer = actor if ambiguous else _likeliest_model(of_actor, own)
+        answers_by_name[_normalised(actor)] = answer
+    if _normalised(given) in answers_by_name:
+        return answers_by_name[_normalised(given)]
+    spellings = {
+        _normalised(n): n for n in (*sorted(_all_models(mind) | set(models)), *models_of_actor)
+    }
+    near = closest(_normalised(given), spellings)
     raise SettingsError(
-        f"'{said}' is neither a model nor an actor",
-        expected=f"one of: {', '.join([*sorted(spelt.values()), 'unknown'])}",
-        hint=near and f"did you mean '{spelt[near]}'?",
+        f"'{given}' is neither a model nor an actor",
+        expected=f"one of: {', '.join([*sorted(spellings.values()), 'unknown'])}",
+        hint=near and f"did you mean '{spellings[near]}'?",
     )
 
 
@@ -119,19 +124,19 @@ def apply_answers(mind: Mind, answers: Mapping[int, str]) -> tuple[Mind, tuple[E
     return mind, events
 
 
-def _models(mind: Mind) -> set[str]:
+def _all_models(mind: Mind) -> set[str]:
     """Every model that occurs in a mind."""
     named = {c.name for b in mind.objects.values() for c in b.candidates}
     named |= {n for q in mind.questions for n in q.names} | set(mind.answers.values())
     return (named | {m for models in mind.actors.values() for m in models}) - {UNKNOWN_OBJECT}
 
 
-def _model(models: Sequence[str], own: Sequence[str]) -> str:
-    """The actor's model that is meant: the object's most likely one, else the first."""
+def _likeliest_model(models: Sequence[str], own: Sequence[str]) -> str:
+    """The model of an actor that is likeliest for the object, else the first."""
     return next((n for n in own if n in models), models[0])
 
 
-def _shared(actor: str, cast: Cast) -> bool:
+def _is_ambiguous(actor: str, cast: Cast) -> bool:
     """Whether another actor has the same models."""
     own = set(cast[actor])
     return not own or any(own & set(found) for a, found in cast.items() if a != actor)

@@ -19,15 +19,15 @@ REASONING_FAILED = "reasoning_failed"
 SINK_FAILED = "sink_failed"
 SOURCE_DROPPED = "source_dropped"
 
-NOT_PASSED_ON = frozenset({NOT_RECORDED, SINK_FAILED})
+DELIVERY_ALERTS = frozenset({NOT_RECORDED, SINK_FAILED})
 """Alerts about recording and delivery, which say nothing about the scene."""
 
-NOT_WATCHED = frozenset(
+PERCEPTION_ALERTS = frozenset(
     {BEHAVIOUR_FAILED, CLOCK_JUMPED, FRAMES_DROPPED, REASONING_FAILED, SOURCE_DROPPED}
 )
 """Alerts about frames that were not perceived or not reasoned about, so that the scene is unknown."""
 
-SYSTEM_ALERTS = NOT_PASSED_ON | NOT_WATCHED
+SYSTEM_ALERTS = DELIVERY_ALERTS | PERCEPTION_ALERTS
 """All alerts about the supervisor itself; rules may not have these names."""
 
 
@@ -52,7 +52,7 @@ def verdict_without_task(kinds: Iterable[str], so_far: Verdict | None = None) ->
     Returns:
         'interrupted' if something unsafe was seen, else 'unknown' if part of it was not watched, else None.
     """
-    grave = frozenset(kinds)
-    if so_far is Verdict.INTERRUPTED or grave - SYSTEM_ALERTS:
+    warnings = frozenset(kinds)
+    if so_far is Verdict.INTERRUPTED or warnings - SYSTEM_ALERTS:
         return Verdict.INTERRUPTED
-    return Verdict.UNKNOWN if grave & NOT_WATCHED else so_far
+    return Verdict.UNKNOWN if warnings & PERCEPTION_ALERTS else so_far

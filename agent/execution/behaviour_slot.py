@@ -38,13 +38,13 @@ from visup.agent.model.records import (
     ReportState,
 )
 
-PATIENCE = 3
+FAILURES_BEFORE_SUSPENSION = 3
 FIRST_SUSPENSION_S = 1.0
 LONGEST_SUSPENSION_S = 60.0
 NEVER = float("-inf")
 
 
-_SETTLED = frozenset({"behaviour", "contract", "limits", "runner", "relieved_by"})
+_CONFIGURATION = frozenset({"behaviour", "contract", "limits", "runner", "relieved_by"})
 """Fields fixed when the agent is created; all others are state."""
 
 
@@ -85,18 +85,18 @@ class BehaviourSlot:
 
     def state_dict(self) -> dict[str, Any]:
         """The state of the slot for a checkpoint."""
-        return {f.name: getattr(self, f.name) for f in fields(self) if f.name not in _SETTLED}
+        return {f.name: getattr(self, f.name) for f in fields(self) if f.name not in _CONFIGURATION}
 
-    def load_state_dict(self, conduct: Mapping[str, Any]) -> None:
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Restore the state of another slot."""
-        for name, value in conduct.items():
+        for name, value in state.items():
             setattr(self, name, value)
 
     @property
     def suspension_s(self) -> float:
         """Duration of the suspension after its latest failure, seconds."""
-        over = self.failures - PATIENCE
-        return 0.0 if over < 0 else min(FIRST_SUSPENSION_S * 2.0**over, LONGEST_SUSPENSION_S)
+        excess = self.failures - FAILURES_BEFORE_SUSPENSION
+        return 0.0 if excess < 0 else min(FIRST_SUSPENSION_S * 2.0**excess, LONGEST_SUSPENSION_S)
 
     def run(
         self, frame: Frame, observation: Observation, directives: Sequence[Directive]
@@ -114,26 +114,26 @@ class BehaviourSlot:
         contract = self.contract
         idle = Report(contract.name, ReportState.RESTED, contract.gives)
         asleep = self._asleep(directives)
-        if (waiting := self._waiting(frame.time, asleep)) is not None:
-            return replace(idle, state=waiting, error=self.error)
+        if (reason := self._why_not_run(frame.time, asleep)) is not None:
+            return replace(idle, state=reason, error=self.error)
         if asleep:
             return replace(idle, error="asleep: nothing requires it")
-        closer = [
+        finer = [
             r.behaviour for r in observation.reports if r.behaviour in self.relieved_by and _ran(r)
         ]
-        if closer:
-            return replace(idle, error=f"'{closer[0]}' looks more closely")
-        unseen = [k for k in contract.needs if not observation.observed(k)]
-        if unseen:
-            blind = any(k in observation.unknown for k in unseen)
+        if finer:
+            return replace(idle, error=f"'{finer[0]}' looks more closely")
+        missing = [k for k in contract.needs if not observation.observed(k)]
+        if missing:
+            blind = any(k in observation.unknown for k in missing)
             state = ReportState.BLIND if blind else ReportState.RESTED
-            return replace(idle, state=state, error=f"'{unseen[0]}' was not observed")
-        if self._within(frame.time, self.last_run, contract.every_s):
+            return replace(idle, state=state, error=f"'{missing[0]}' was not observed")
+        if self._is_within(frame.time, self.last_run, contract.every_s):
             return idle
         self.last_run = frame.time
         begin = self.limits.clock()
         try:
-            percepts = self._held(
+            percepts = self._run_within_limits(
                 frame, replace(observation, past=tuple(self.past)), directives, begin
             )
         except Exception as fault:
@@ -151,51 +151,53 @@ class BehaviourSlot:
 
     def _asleep(self, directives: Sequence[Directive]) -> bool:
         name = self.contract.name
-        asked = (d for d in directives if d.kind == WAKE and d.data.get("behaviour") == name)
-        return self.limits.sleeps(self.contract) and next(asked, None) is None
+        wake_requests = (
+            d for d in directives if d.kind == WAKE and d.data.get("behaviour") == name
+        )
+        return self.limits.sleeps(self.contract) and next(wake_requests, None) is None
 
-    def _waiting(self, now: float, asleep: bool) -> ReportState | None:
+    def _why_not_run(self, now: float, asleep: bool) -> ReportState | None:
         """Why the behaviour does not run now after a failure; None if it may."""
         if self.runner.maintain():
             return ReportState.LATE
-        if self._within(now, self.suspended_at, self.suspension_s):
+        if self._is_within(now, self.suspended_at, self.suspension_s):
             return ReportState.SUSPENDED
-        if self.error and (asleep or self._within(now, self.last_run, self.contract.every_s)):
+        if self.error and (asleep or self._is_within(now, self.last_run, self.contract.every_s)):
             return ReportState.SUSPENDED
         return None
 
     @staticmethod
-    def _within(now: float, since: float, seconds: float) -> bool:
+    def _is_within(now: float, since: float, seconds: float) -> bool:
         # A clock that was set back must not prolong the wait; rounding must not cost a frame.
         return 0.0 <= now - since < seconds - 1e-9
 
-    def _held(
+    def _run_within_limits(
         self, frame: Frame, observation: Observation, directives: Sequence[Directive], begin: float
     ) -> tuple[Percept, ...]:
         """Run it within its limits."""
         seconds = self.limits.seconds(self.contract)
-        before = resident_mb()
+        memory_before = resident_mb()
         percepts = self.runner.run(frame, observation, directives, seconds)
-        taken = self.limits.clock() - begin
-        if self.limits.budgets and seconds is not None and taken > seconds:
+        elapsed = self.limits.clock() - begin
+        if self.limits.budgets and seconds is not None and elapsed > seconds:
             raise RunTimeoutError(f"it took longer than its budget of {duration_text(seconds)}")
         # Memory freed by others during the run must not offset its later growth.
-        self.grown_mb = max(0.0, self.grown_mb + resident_mb() - before)
-        most = self.limits.megabytes(self.contract)
-        if self.grown_mb > most:
+        self.grown_mb = max(0.0, self.grown_mb + resident_mb() - memory_before)
+        limit_mb = self.limits.megabytes(self.contract)
+        if self.grown_mb > limit_mb:
             self.grown_mb = 0.0
-            raise MemoryLimitError(f"it made the process grow by more than {most:g} MB")
+            raise MemoryLimitError(f"it made the process grow by more than {limit_mb:g} MB")
         return percepts
 
     def _fail(self, fault: Exception, now: float) -> None:
         self.error = error_line(fault)
         self.failures += 1
-        if self._grave(fault):
-            self.failures = max(self.failures, PATIENCE)
-        if self.failures >= PATIENCE:
+        if self._suspends_at_once(fault):
+            self.failures = max(self.failures, FAILURES_BEFORE_SUSPENSION)
+        if self.failures >= FAILURES_BEFORE_SUSPENSION:
             self.suspended_at = now
 
-    def _grave(self, fault: Exception) -> bool:
+    def _suspends_at_once(self, fault: Exception) -> bool:
         """Whether a retry is too expensive: each hang costs its whole limit again."""
         if isinstance(fault, RunTimeoutError):
             return not self.limits.budgets

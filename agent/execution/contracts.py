@@ -11,7 +11,7 @@ from visup.agent.execution.process_runner import ChildProcess
 from visup.agent.model import errors
 from visup.agent.model.errors import BehaviourError, ErrorGroup, VisupError
 
-READING_S = 60.0
+IMPORT_TIMEOUT_S = 60.0
 """Time limit for importing a file of behaviours, seconds."""
 
 
@@ -28,23 +28,23 @@ def read_contracts(
         BehaviourError: It is missing, does not run, ends its process, or has no behaviour.
         SettingsError: A setting is not valid.
     """
-    asked = {"do": "contracts", "where": where, "settings": _plain(settings or {})}
-    child = ChildProcess(asked)
+    request = {"do": "contracts", "where": where, "settings": _as_dicts(settings or {})}
+    child = ChildProcess(request)
     try:
-        answer = child.receive(READING_S, "its contract was not given")
+        answer = child.receive(IMPORT_TIMEOUT_S, "its contract was not given")
     except BehaviourError as fault:
         raise BehaviourError(f"it does not run: {fault.what}", where=where) from fault
     finally:
         child.close()
     if "fault" in answer:
-        raise _refused(answer, where)
+        raise _reported_error(answer, where)
     try:
         return [Contract(**_tuples(fields)) for fields in answer["contracts"]]
     except (KeyError, TypeError, AttributeError) as fault:
         raise BehaviourError("its contract cannot be read", where=where) from fault
 
 
-def _plain(settings: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+def _as_dicts(settings: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
     return {name: dict(values) for name, values in settings.items()}
 
 
@@ -52,15 +52,15 @@ def _tuples(fields: Mapping[str, Any]) -> dict[str, Any]:
     return {k: tuple(v) if isinstance(v, list) else v for k, v in fields.items()}
 
 
-def _refused(answer: Message, where: str) -> VisupError:
+def _reported_error(answer: Message, where: str) -> VisupError:
     """The error that the process reported, with all its parts."""
     fields = answer.get("refused")
     faults = [_error(f, where) for f in fields if isinstance(f, Mapping)] if fields else []
     if len(faults) > 1:
         return ErrorGroup(faults)
-    said = answer["fault"]
-    words = ": ".join(str(s) for s in said if s) if isinstance(said, list) else ""
-    return faults[0] if faults else BehaviourError(f"it does not run: {words[:1000]}", where=where)
+    fault = answer["fault"]
+    text = ": ".join(str(s) for s in fault if s) if isinstance(fault, list) else ""
+    return faults[0] if faults else BehaviourError(f"it does not run: {text[:1000]}", where=where)
 
 
 def _error(fields: Mapping[str, Any], where: str) -> VisupError:

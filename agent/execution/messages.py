@@ -89,14 +89,14 @@ class Channel:
         self._end.close()
 
     def _read(self, count: int, deadline: float | None) -> bytes:
-        got = bytearray()
-        while len(got) < count:
+        data = bytearray()
+        while len(data) < count:
             remaining = None if deadline is None else deadline - time.monotonic()
             if remaining is not None and remaining <= 0.0:
                 raise TimeoutError
             self._end.settimeout(remaining)
-            part = self._end.recv(min(_CHUNK, count - len(got)))
-            if not part:
+            chunk = self._end.recv(min(_CHUNK, count - len(data)))
+            if not chunk:
                 raise EOFError
-            got += part
-        return bytes(got)
+            data += chunk
+        return bytes(data)

@@ -31,55 +31,57 @@ def ordered_slots(
         BehaviourError: Two have the same name, a need is given by none or only in a cycle, or a name to
             isolate is not among them.
     """
-    held = limits or Limits()
+    used_limits = limits or Limits()
     named = {b.contract.name: b for b in behaviours}
     if len(named) < len(behaviours):
         names = [b.contract.name for b in behaviours]
         twice = next(n for n in names if names.count(n) > 1)
         raise BehaviourError(f"two behaviours are called '{twice}'", hint="rename one of them")
-    for name in sorted(held.isolate - named.keys()):
+    for name in sorted(used_limits.isolate - named.keys()):
         raise BehaviourError(
             f"there is no behaviour called '{name}' to isolate",
             expected=f"one of: {', '.join(sorted(named))}",
         )
-    closer = {n: _closer(b, behaviours) for n, b in named.items()}
-    before = {n: [*_providers(b, behaviours), *closer[n]] for n, b in named.items()}
+    relieving = {n: _relieving(b, behaviours) for n, b in named.items()}
+    predecessors = {n: [*_providers(b, behaviours), *relieving[n]] for n, b in named.items()}
     try:
-        order = list(TopologicalSorter(before).static_order())
-    except CycleError as circle:
-        path = " -> ".join(circle.args[1])
-        raise BehaviourError(f"behaviours wait for each other in a circle: {path}") from circle
-    slots = [make_slot(named[name], held) for name in order]
+        order = list(TopologicalSorter(predecessors).static_order())
+    except CycleError as cycle:
+        path = " -> ".join(cycle.args[1])
+        raise BehaviourError(f"behaviours wait for each other in a circle: {path}") from cycle
+    slots = [make_slot(named[name], used_limits) for name in order]
     for slot in slots:
-        slot.relieved_by = frozenset(closer[slot.contract.name])
+        slot.relieved_by = frozenset(relieving[slot.contract.name])
     return slots
 
 
-def _closer(behaviour: Behaviour, behaviours: Sequence[Behaviour]) -> list[str]:
+def _relieving(behaviour: Behaviour, behaviours: Sequence[Behaviour]) -> list[str]:
     """Names of the behaviours that relieve one; they must give all that it gives."""
-    coarse = behaviour.contract
-    fine = [b.contract for b in behaviours if coarse.name in b.contract.relieves]
-    for contract in fine:
-        for kind in coarse.gives:
+    relieved = behaviour.contract
+    finer = [b.contract for b in behaviours if relieved.name in b.contract.relieves]
+    for contract in finer:
+        for kind in relieved.gives:
             if kind not in contract.gives:
                 raise BehaviourError(
-                    f"behaviour '{contract.name}' relieves '{coarse.name}', but does not give '{kind}'",
-                    hint=f"let it give '{kind}' too, or leave '{coarse.name}' at work",
+                    f"behaviour '{contract.name}' relieves '{relieved.name}', but does not give '{kind}'",
+                    hint=f"let it give '{kind}' too, or leave '{relieved.name}' at work",
                 )
-    return [c.name for c in fine]
+    return [c.name for c in finer]
 
 
 def _providers(behaviour: Behaviour, behaviours: Sequence[Behaviour]) -> list[str]:
     """Names of the other behaviours that give what one needs."""
     contract = behaviour.contract
     others = [b.contract for b in behaviours if b is not behaviour]
-    given = {kind for c in others for kind in c.gives}
+    given_kinds = {kind for c in others for kind in c.gives}
     for kind in contract.needs:
-        if kind not in given:
-            alone = " but itself" if kind in contract.gives else ""
+        if kind not in given_kinds:
+            besides_itself = " but itself" if kind in contract.gives else ""
             raise BehaviourError(
-                f"behaviour '{contract.name}' needs '{kind}', which no behaviour{alone} gives",
-                expected=f"one of: {', '.join(sorted(given))}" if given else "another behaviour",
+                f"behaviour '{contract.name}' needs '{kind}', which no behaviour{besides_itself} gives",
+                expected=f"one of: {', '.join(sorted(given_kinds))}"
+                if given_kinds
+                else "another behaviour",
             )
     return [c.name for c in others if set(contract.needs) & set(c.gives)]
 
@@ -97,16 +99,16 @@ def perceive(
     Returns:
         One report for each behaviour, in order.
     """
-    shown = read_only(frame)
+    read_only_frame = read_only(frame)
     observation = Observation(frame.index, frame.time, frame.size)
     for slot in slots:
-        report = slot.run(shown, observation, directives)
+        report = slot.run(read_only_frame, observation, directives)
         earlier = observation.reports
         if slot.relieved_by and report.state is ReportState.RAN:
             earlier = tuple(superseded(r, slot) for r in earlier)
         observation = replace(observation, reports=(*earlier, report))
     for slot in slots:
-        slot.remember(shown, observation)
+        slot.remember(read_only_frame, observation)
     return observation
 
 

@@ -32,7 +32,7 @@ from visup.agent.plugins.isolated import IsolatedBehaviour
 from visup.agent.storage.checkpoint import StateError, dump_state, loaded_modules, state_of
 from visup.agent.storage.codec import decode_percept, encode, to_document
 
-PLUG_IN = "visup_plugin_"
+PLUGIN_MODULE_PREFIX = "visup_plugin_"
 
 
 class ProcessRunner:
@@ -53,8 +53,8 @@ class ProcessRunner:
         memory_mb = limits.megabytes(contract)
         self._origin = {"do": "start", "memory_mb": memory_mb, **origin_of(behaviour, contract)}
         self._child: ChildProcess | None = None
-        self._replaces = False
-        self._sent = -1
+        self._is_replacement = False
+        self._last_sent_index = -1
 
     def maintain(self) -> bool:
         """Start a new process in place of a killed one, while the behaviour is suspended.
@@ -64,7 +64,7 @@ class ProcessRunner:
         """
         if self._child is not None and self._child.killed:
             self._child = self._start(self._child)
-        if self._child is None or not self._replaces or not self._limits.budgets:
+        if self._child is None or not self._is_replacement or not self._limits.budgets:
             return False
         return self._child.is_starting(self._limits.start_s)
 
@@ -96,19 +96,19 @@ class ProcessRunner:
     def _start(self, old: ChildProcess | None = None) -> ChildProcess:
         if old is not None:
             old.close()
-        self._replaces = old is not None
-        self._sent = -1
+        self._is_replacement = old is not None
+        self._last_sent_index = -1
         return ChildProcess(self._origin)
 
     def _ready(self, seconds: float | None) -> ChildProcess:
         """The process, once its behaviour has started."""
         child = self._child = self._child or self._start()
         # A budget limits the wait of a step; without one, waiting keeps runs reproducible.
-        patient = not self._limits.budgets or not self._replaces
+        wait_for_start = not self._limits.budgets or not self._is_replacement
         try:
-            child.await_start(self._limits.start_s if patient else seconds)
+            child.await_start(self._limits.start_s if wait_for_start else seconds)
         except BehaviourError as fault:
-            if not isinstance(fault, RunTimeoutError) or patient:
+            if not isinstance(fault, RunTimeoutError) or wait_for_start:
                 self._child = None
                 child.close()
             raise
@@ -121,14 +121,14 @@ class ProcessRunner:
         observation: Observation,
         directives: Sequence[Directive],
     ) -> Message:
-        news = [p for p in observation.past if p.frame.index > self._sent]
+        new_frames = [p for p in observation.past if p.frame.index > self._last_sent_index]
         if observation.past:
-            self._sent = observation.past[-1].frame.index
-        placed = child.place([frame.image, *(p.frame.image for p in news)])
+            self._last_sent_index = observation.past[-1].frame.index
+        placements = child.place([frame.image, *(p.frame.image for p in new_frames)])
         return {
             "index": frame.index,
             "time": frame.time,
-            "image": next(placed),
+            "image": next(placements),
             "observation": to_document(observation),
             "directives": [encode(d) for d in directives],
             "past": [
@@ -138,7 +138,7 @@ class ProcessRunner:
                     "image": image,
                     "observation": to_document(p.observation),
                 }
-                for p, image in zip(news, placed, strict=True)
+                for p, image in zip(new_frames, placements, strict=True)
             ],
         }
 
@@ -153,7 +153,7 @@ class ChildProcess:
     def __init__(self, first: Message) -> None:
         self._sandbox = Sandbox()
         self._channel = Channel(self._sandbox.end)
-        self._begun = time.monotonic()
+        self._started_at = time.monotonic()
         self._started = False
         self.killed = False
         self.close = self._sandbox.close
@@ -166,7 +166,7 @@ class ChildProcess:
 
     def is_starting(self, patience_s: float) -> bool:
         """Whether it has not answered yet, and the given time has not passed."""
-        if self._started or time.monotonic() - self._begun > patience_s:
+        if self._started or time.monotonic() - self._started_at > patience_s:
             return False
         return not self._channel.has_news()
 
@@ -196,7 +196,7 @@ class ChildProcess:
             except TimeoutError as fault:
                 raise RunTimeoutError("it does not listen") from fault
             except OSError as fault:
-                raise self._lost() from fault
+                raise self._died_error() from fault
             return self.receive(seconds, "it gave no answer")
         except BehaviourError:
             self.kill()
@@ -213,7 +213,7 @@ class ChildProcess:
         except TimeoutError as fault:
             raise RunTimeoutError(f"{what} within {duration_text(seconds or 0.0)}") from fault
         except (EOFError, OSError) as fault:
-            raise self._lost() from fault
+            raise self._died_error() from fault
         except MessageError as fault:
             raise ProcessDiedError(str(fault)) from fault
         if not isinstance(answer, Mapping):
@@ -223,21 +223,21 @@ class ChildProcess:
     def place(self, images: Sequence[NDArray[np.uint8]]) -> Iterator[list[int]]:
         """Write images to the memory file; returns offset and shape of each."""
         # Written, not mapped: a process that truncates the file harms only itself.
-        offset, placed = 0, []
+        offset, placements = 0, []
         for image in images:
             data = np.ascontiguousarray(image).data.cast("B")
-            done = 0
-            while done < len(data):
-                done += os.pwrite(self._sandbox.frames, data[done:], offset + done)
-            placed.append([offset, *image.shape])
+            written = 0
+            while written < len(data):
+                written += os.pwrite(self._sandbox.frames, data[written:], offset + written)
+            placements.append([offset, *image.shape])
             offset += len(data)
-        return iter(placed)
+        return iter(placements)
 
-    def _lost(self) -> ProcessDiedError:
-        how = self._sandbox.how_it_ended()
+    def _died_error(self) -> ProcessDiedError:
+        reason = self._sandbox.exit_text()
         if self._sandbox.output.exceeded:
-            how = f"wrote more than {LARGEST_OUTPUT_BYTES >> 20} MB to its output and was ended"
-        return ProcessDiedError(f"its process {how}")
+            reason = f"wrote more than {LARGEST_OUTPUT_BYTES >> 20} MB to its output and was ended"
+        return ProcessDiedError(f"its process {reason}")
 
 
 def _fault(answer: Message) -> tuple[str, str]:
@@ -276,7 +276,7 @@ def origin_of(behaviour: Behaviour, contract: Contract) -> Message:
     kind = type(behaviour)
     module = sys.modules.get(kind.__module__)
     file = str(getattr(module, "__file__", "") or "")
-    own = kind.__module__.startswith(PLUG_IN) or kind.__module__ == "__main__"
+    is_user_code = kind.__module__.startswith(PLUGIN_MODULE_PREFIX) or kind.__module__ == "__main__"
     attributes = state_of(behaviour)
     settings = _settings_document(kind, attributes.get("settings"))
     if settings is not None:
@@ -294,7 +294,7 @@ def origin_of(behaviour: Behaviour, contract: Contract) -> Message:
     return {
         "object": kind.__qualname__,
         "module": kind.__module__,
-        "file": file if own else "",
+        "file": file if is_user_code else "",
         "modules": loaded_modules(packed),
         "attributes": base64.b64encode(packed).decode(),
         "own_settings": settings,

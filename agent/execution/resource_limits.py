@@ -45,21 +45,21 @@ def limit_memory(memory_mb: float, *, final: bool = True) -> None:
     try:
         import resource
 
-        addresses, *_, data, _ = map(int, Path("/proc/self/statm").read_text().split())
-        page, more = resource.getpagesize(), int(memory_mb * 2**20)
-        _set(resource.RLIMIT_DATA, data * page + more, final=final)
+        address_pages, *_, data_pages, _ = map(int, Path("/proc/self/statm").read_text().split())
+        page, additional = resource.getpagesize(), int(memory_mb * 2**20)
+        _set(resource.RLIMIT_DATA, data_pages * page + additional, final=final)
         if final:
-            _set(resource.RLIMIT_AS, addresses * page + more + ADDRESSES_MB * 2**20)
+            _set(resource.RLIMIT_AS, address_pages * page + additional + ADDRESSES_MB * 2**20)
     except (ImportError, OSError, ValueError):
         return
 
 
-def _set(kind: int, most: int, *, final: bool = True) -> None:
+def _set(kind: int, limit: int, *, final: bool = True) -> None:
     import resource
 
     _, hard = resource.getrlimit(kind)
-    if hard == resource.RLIM_INFINITY or most < hard:
-        resource.setrlimit(kind, (most, most if final else hard))
+    if hard == resource.RLIM_INFINITY or limit < hard:
+        resource.setrlimit(kind, (limit, limit if final else hard))
 
 
 def _tasks() -> int:

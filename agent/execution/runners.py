@@ -24,7 +24,7 @@ from visup.agent.model.errors import BehaviourError
 from visup.agent.model.events import Directive
 from visup.agent.model.records import Frame, Observation, Percept
 
-STOPPING_S = 0.05
+STOP_WAIT_S = 0.05
 """How long a step waits for a thread that was asked to stop, seconds."""
 
 
@@ -86,9 +86,9 @@ def run_behaviour(
 
 def start_behaviour(behaviour: Behaviour) -> tuple[Percept, ...]:
     """Call its method `start`, if it has one; returns no percepts."""
-    begin = getattr(behaviour, "start", None)
-    if callable(begin):
-        begin()
+    start = getattr(behaviour, "start", None)
+    if callable(start):
+        start()
     return ()
 
 
@@ -117,8 +117,8 @@ class DirectRunner:
                 start_behaviour(self._behaviour)
                 self._started = True
             return run_behaviour(self._behaviour, self._contract, frame, observation, directives)
-        except (SystemExit, GeneratorExit) as leaving:
-            raise _as_error(leaving) from leaving
+        except (SystemExit, GeneratorExit) as exit_fault:
+            raise _as_error(exit_fault) from exit_fault
 
     def close(self) -> None:
         """Nothing to release."""
@@ -130,22 +130,22 @@ class _Job:
 
     work: Callable[[], tuple[Percept, ...]]
     done: threading.Event = field(default_factory=threading.Event)
-    ending: threading.Lock = field(default_factory=threading.Lock)
-    tried: bool = False
-    given_up: bool = False
+    completion_lock: threading.Lock = field(default_factory=threading.Lock)
+    started: bool = False
+    abandoned: bool = False
     percepts: tuple[Percept, ...] = ()
     fault: BaseException | None = None
 
     def run(self) -> None:
         """Do the work once and store the result."""
-        if not self.tried:
-            self.tried = True
+        if not self.started:
+            self.started = True
             try:
                 self.percepts = self.work()
             except BaseException as fault:
                 # Any exception is a failure of the behaviour and is re-raised in the waiting thread.
                 self.fault = fault if isinstance(fault, Exception) else _as_error(fault)
-        with self.ending:
+        with self.completion_lock:
             self.done.set()
 
 
@@ -167,17 +167,17 @@ class ThreadRunner:
         self._started = False
         self._jobs: SimpleQueue[_Job | None] | None = None
         self._thread: threading.Thread | None = None
-        self._given_up: tuple[threading.Thread, _Job] | None = None
+        self._abandoned: tuple[threading.Thread, _Job] | None = None
 
     def maintain(self) -> bool:
         """Ask an abandoned run to stop once more; returns whether it is still active."""
-        if self._given_up is None:
+        if self._abandoned is None:
             return False
-        thread, job = self._given_up
+        thread, job = self._abandoned
         if thread.is_alive():
-            _ask_to_stop(thread, job)
+            _request_stop(thread, job)
             return True
-        self._given_up = None
+        self._abandoned = None
         return False
 
     def run(
@@ -206,7 +206,7 @@ class ThreadRunner:
     def _wait(self, job: _Job, seconds: float | None) -> tuple[Percept, ...]:
         self._queue().put(job)
         if not job.done.wait(seconds):
-            self._give_up(job)
+            self._abandon(job)
             raise RunTimeoutError(f"it gave no answer within {duration_text(seconds or 0.0)}")
         if job.fault is not None:
             raise job.fault
@@ -223,23 +223,23 @@ class ThreadRunner:
             self._jobs = jobs
         return self._jobs
 
-    def _give_up(self, job: _Job) -> None:
-        job.given_up = True
+    def _abandon(self, job: _Job) -> None:
+        job.abandoned = True
         self.close()
         if self._thread is not None:
-            self._given_up = self._thread, job
-            _ask_to_stop(self._thread, job)
+            self._abandoned = self._thread, job
+            _request_stop(self._thread, job)
             # Python code stops at once; other code is checked again in later steps.
-            self._thread.join(STOPPING_S)
+            self._thread.join(STOP_WAIT_S)
 
 
 def _serve(jobs: SimpleQueue[_Job | None]) -> None:
     while (job := jobs.get()) is not None:
         while not job.done.is_set():
             # The request to stop may arrive at any moment; the work is never repeated.
-            with suppress(_StopAsked):
+            with suppress(_StopRequested):
                 job.run()
-        if job.given_up:
+        if job.abandoned:
             return
         del job  # an idle thread must not keep a frame alive
 
@@ -249,16 +249,16 @@ def _as_error(fault: BaseException) -> BehaviourError:
     return BehaviourError(f"it called for an exit ({type(fault).__name__})")
 
 
-class _StopAsked(SystemExit):
+class _StopRequested(SystemExit):
     """Raised in an abandoned thread: it passes behaviours that catch `Exception`."""
 
 
-def _ask_to_stop(thread: threading.Thread, job: _Job) -> None:
-    """Raise `_StopAsked` in a thread unless its work is done."""
-    with job.ending:
+def _request_stop(thread: threading.Thread, job: _Job) -> None:
+    """Raise `_StopRequested` in a thread unless its work is done."""
+    with job.completion_lock:
         if thread.ident is not None and not job.done.is_set():
             ctypes.pythonapi.PyThreadState_SetAsyncExc(
-                ctypes.c_ulong(thread.ident), ctypes.py_object(_StopAsked)
+                ctypes.c_ulong(thread.ident), ctypes.py_object(_StopRequested)
             )
 
 

@@ -27,12 +27,12 @@ from visup.agent.model.errors import BehaviourError
 CAN_ISOLATE = os.name == "posix"
 LARGEST_OUTPUT_BYTES = 16 * 2**20
 """Limit of its standard output and error together; beyond it the process is ended."""
-KEPT_OUTPUT_BYTES = 2000
-ENDING_S = 5.0
-PATIENCE_S = 1.0
+OUTPUT_TAIL_BYTES = 2000
+KILL_TIMEOUT_S = 5.0
+EXIT_TIMEOUT_S = 1.0
 
 NAMESPACES = ("--user", "--map-current-user", "--pid", "--fork", "--kill-child=KILL")
-WARDEN = '(read none <&"$1"; kill -9 -1) 2>/dev/null & shift; "$@"; exit "$?"'
+NAMESPACE_INIT = '(read none <&"$1"; kill -9 -1) 2>/dev/null & shift; "$@"; exit "$?"'
 """First process of the namespace: runs the command, and ends all once the supervisor is gone."""
 
 
@@ -50,22 +50,29 @@ class Sandbox:
                 "behaviours cannot run in processes of their own on this system",
                 expected="Linux, macOS or another POSIX system",
             )
-        self.end, theirs = socket.socketpair()
+        self.end, child_end = socket.socketpair()
         self.frames = _memory_file()
-        lifeline, keep = os.pipe()
-        passed = (theirs.fileno(), self.frames, lifeline)
+        lifeline, lifeline_end = os.pipe()
+        inherited = (child_end.fileno(), self.frames, lifeline)
         self._process = subprocess.Popen(
-            [*_wrapped(lifeline), sys.executable, "-P", "-m", WORKER, *map(str, passed)],
+            [
+                *_namespace_prefix(lifeline),
+                sys.executable,
+                "-P",
+                "-m",
+                WORKER,
+                *map(str, inherited),
+            ],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
-            pass_fds=passed,
+            pass_fds=inherited,
             start_new_session=True,
             env={**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
         )
-        theirs.close()
+        child_end.close()
         os.close(lifeline)
-        self._lifeline = _Lifeline(self._process, os.fdopen(keep, "wb"))
+        self._lifeline = _Lifeline(self._process, os.fdopen(lifeline_end, "wb"))
         self.output = _Output(self._process, self._lifeline)
         self.close = weakref.finalize(self, _end, self._lifeline, self.end, self.frames)
 
@@ -73,15 +80,15 @@ class Sandbox:
         """Kill it with its children; `close` releases the resources."""
         self._lifeline.cut()
 
-    def how_it_ended(self) -> str:
+    def exit_text(self) -> str:
         """How a process ended by itself, with the last line of its output."""
         try:
             code = self._process.wait(1.0)
         except subprocess.TimeoutExpired:
             return "closed its connection"
         number = -code if code < 0 else code - 128  # shell convention
-        how = f"by signal {number}" if number > 0 else f"with exit code {code}"
-        return f"ended {how}{self.output.last_line()}"
+        reason = f"by signal {number}" if number > 0 else f"with exit code {code}"
+        return f"ended {reason}{self.output.last_line()}"
 
 
 WORKER = "visup.agent.execution.worker"
@@ -93,27 +100,27 @@ class _Lifeline:
 
     Attributes:
         process: The process, or with namespaces the outer one that waits for all inner ones.
-        held: A pipe end; closing it ends the process.
+        pipe_end: A pipe end; closing it ends the process.
     """
 
     process: subprocess.Popen[bytes]
-    held: IO[bytes]
+    pipe_end: IO[bytes]
 
     def cut(self) -> None:
         """Kill the process."""
-        self.held.close()
-        if not isolating():
+        self.pipe_end.close()
+        if not can_use_namespaces():
             self._kill_group()
 
     def end(self) -> None:
         """Kill it, and wait until it and its children have ended."""
         self.cut()
-        for seconds in (PATIENCE_S, ENDING_S):
+        for seconds in (EXIT_TIMEOUT_S, KILL_TIMEOUT_S):
             with suppress(subprocess.TimeoutExpired):
                 self.process.wait(seconds)
                 break
             self._kill_group()  # the first process of the namespace was itself killed
-        if not isolating():
+        if not can_use_namespaces():
             self._kill_group()  # children left behind
 
     def _kill_group(self) -> None:
@@ -127,14 +134,14 @@ class _Output:
 
     def __init__(self, process: subprocess.Popen[bytes], lifeline: _Lifeline) -> None:
         self.exceeded = False
-        self._kept = b""
+        self._tail = b""
         self._thread = threading.Thread(target=self._drain, args=(process, lifeline), daemon=True)
         self._thread.start()
 
     def last_line(self) -> str:
         """': ' and the last line of the output, or nothing."""
         self._thread.join(0.5)
-        lines = self._kept.decode(errors="replace").split("\n")
+        lines = self._tail.decode(errors="replace").split("\n")
         written = [line.strip() for line in lines if line.strip()]
         return f": {written[-1][:200]}" if written else ""
 
@@ -144,7 +151,7 @@ class _Output:
         with suppress(OSError, ValueError):
             while part := os.read(stream.fileno(), 2**16):
                 total += len(part)
-                self._kept = (self._kept + part)[-KEPT_OUTPUT_BYTES:]
+                self._tail = (self._tail + part)[-OUTPUT_TAIL_BYTES:]
                 if total > LARGEST_OUTPUT_BYTES and not self.exceeded:
                     # Read until it has ended: a broken pipe would be reported as its fault.
                     self.exceeded = True
@@ -152,8 +159,10 @@ class _Output:
         stream.close()
 
 
-def _wrapped(lifeline: int) -> list[str]:
-    return [*namespace_command(), "sh", "-c", WARDEN, "sh", str(lifeline)] if isolating() else []
+def _namespace_prefix(lifeline: int) -> list[str]:
+    if not can_use_namespaces():
+        return []
+    return [*namespace_command(), "sh", "-c", NAMESPACE_INIT, "sh", str(lifeline)]
 
 
 def namespace_command() -> list[str]:
@@ -162,17 +171,17 @@ def namespace_command() -> list[str]:
 
 
 @cache
-def isolating() -> bool:
+def can_use_namespaces() -> bool:
     """Whether processes can have their own namespaces here."""
     if not sys.platform.startswith("linux") or shutil.which("unshare") is None:
         return False
     try:
-        tried = subprocess.run(
+        result = subprocess.run(
             [*namespace_command(), "true"], capture_output=True, timeout=10, check=False
         )
     except (OSError, subprocess.SubprocessError):
         return False
-    return tried.returncode == 0
+    return result.returncode == 0
 
 
 def _memory_file() -> int:

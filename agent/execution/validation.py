@@ -9,7 +9,13 @@ from collections.abc import Iterable, Mapping
 from itertools import islice
 
 from visup.agent.contract.contract import Contract
-from visup.agent.contract.percept_values import a_kind, brief, check_value, expect, is_finite
+from visup.agent.contract.percept_values import (
+    brief,
+    check_value,
+    expect,
+    is_finite,
+    type_with_article,
+)
 from visup.agent.model.errors import BehaviourError
 from visup.agent.model.records import Frame, Observation, Percept, Region
 
@@ -24,7 +30,7 @@ def collect_percepts(contract: Contract, returned: object) -> tuple[Percept, ...
     """
     if not isinstance(returned, Iterable) or isinstance(returned, str | bytes | Mapping | Percept):
         raise BehaviourError(
-            f"behaviour '{contract.name}' returned {a_kind(returned)}",
+            f"behaviour '{contract.name}' returned {type_with_article(returned)}",
             expected="percepts, one after another: yield each, or return a list of them",
             hint="return () when there is nothing to report" if returned is None else None,
         )
@@ -32,7 +38,8 @@ def collect_percepts(contract: Contract, returned: object) -> tuple[Percept, ...
     for percept in percepts:
         if not isinstance(percept, Percept):
             raise BehaviourError(
-                f"behaviour '{contract.name}' reported {a_kind(percept)}", expected="a Percept"
+                f"behaviour '{contract.name}' reported {type_with_article(percept)}",
+                expected="a Percept",
             )
     if len(percepts) > contract.most_percepts:
         raise BehaviourError(

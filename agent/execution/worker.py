@@ -39,14 +39,16 @@ from visup.agent.storage.codec import (
     from_document,
 )
 
-_SOME = (ArithmeticError, ZeroDivisionError, AttributeError, IndexError, KeyError, MemoryError)
-_MORE = (OSError, RecursionError, RuntimeError, TypeError, ValueError)
+_BUILT_IN = (
+    *(ArithmeticError, ZeroDivisionError, AttributeError, IndexError, KeyError, MemoryError),
+    *(OSError, RecursionError, RuntimeError, TypeError, ValueError),
+)
 EXCEPTIONS: Mapping[str, type[Exception]] = MappingProxyType(
-    {kind.__name__: kind for kind in (*_SOME, *_MORE)}
+    {kind.__name__: kind for kind in _BUILT_IN}
 )
 """Exceptions that are reported by their names; all others become `BehaviourError`."""
 
-LONGEST_REFUSAL = 100
+MOST_REPORTED_FAULTS = 100
 """Maximum number of reported faults of settings."""
 
 
@@ -62,7 +64,7 @@ def main(channel: Channel, frames: int) -> None:
         if first["do"] == "contracts":
             _answer(channel, lambda: _contracts(first))
             return
-        started = _answer(channel, lambda: _started(first))
+        started = _answer(channel, lambda: _start_requested(first))
         if started is None:
             return
         past: deque[PastFrame] = deque(maxlen=started.contract.history)
@@ -71,11 +73,11 @@ def main(channel: Channel, frames: int) -> None:
             _answer(channel, lambda r=request: _run(started, r, past, frames))  # type: ignore[misc]
 
 
-def _answer(channel: Channel, does: Callable[[], tuple[Message, Any]]) -> Any:
+def _answer(channel: Channel, work: Callable[[], tuple[Message, Any]]) -> Any:
     """Call a function and send its answer; returns its result, or None if it failed."""
-    made = None
+    result = None
     try:
-        message, made = does()
+        message, result = work()
     except BaseException as fault:
         # Any exception is a failure of the behaviour; the supervisor decides what follows.
         message = _failure(fault)
@@ -83,63 +85,67 @@ def _answer(channel: Channel, does: Callable[[], tuple[Message, Any]]) -> Any:
         channel.send(message)
     except ValueError as fault:
         channel.send({"fault": ["", f"what it reported cannot be sent: {error_line(fault)}"]})
-    return made
+    return result
 
 
-def _contracts(asked: Message) -> tuple[Message, None]:
+def _contracts(request: Message) -> tuple[Message, None]:
     """The contracts of a file or module, whose behaviours are created with their settings."""
     limit_at_start(0.0)
-    made = load_behaviours(asked["where"], asked["settings"])
+    made = load_behaviours(request["where"], request["settings"])
     return {"contracts": [contract_document(b.contract) for b in made]}, None
 
 
-def _started(asked: Message) -> tuple[Message, Behaviour]:
-    limit_at_start(asked["memory_mb"])
-    behaviour = _rebuilt(asked) if "object" in asked else _loaded(asked)
+def _start_requested(request: Message) -> tuple[Message, Behaviour]:
+    limit_at_start(request["memory_mb"])
+    behaviour = _recreated(request) if "object" in request else _loaded(request)
     start_behaviour(behaviour)
-    limit_memory(asked["memory_mb"])
+    limit_memory(request["memory_mb"])
     return {}, behaviour
 
 
-def _loaded(asked: Message) -> Behaviour:
+def _loaded(request: Message) -> Behaviour:
     """The behaviour of a name in a file or module."""
-    for made in load_behaviours(asked["where"], asked["settings"]):
-        if made.contract.name == asked["name"]:
+    for made in load_behaviours(request["where"], request["settings"]):
+        if made.contract.name == request["name"]:
             return made
-    raise BehaviourError(f"there is no behaviour called '{asked['name']}'", where=asked["where"])
+    raise BehaviourError(
+        f"there is no behaviour called '{request['name']}'", where=request["where"]
+    )
 
 
-def _rebuilt(asked: Message) -> Behaviour:
+def _recreated(request: Message) -> Behaviour:
     """A behaviour created in the supervisor, with the attributes that it had there."""
-    for name in asked["modules"]:
+    for name in request["modules"]:
         importlib.import_module(name)
-    file = asked["file"]
-    kind: Any = import_file(Path(file)) if file else importlib.import_module(asked["module"])
-    for part in asked["object"].split("."):
+    file = request["file"]
+    kind: Any = import_file(Path(file)) if file else importlib.import_module(request["module"])
+    for part in request["object"].split("."):
         kind = getattr(kind, part)
     made = object.__new__(kind)
-    for name, value in load_state(base64.b64decode(asked["attributes"])).items():
+    for name, value in load_state(base64.b64decode(request["attributes"])).items():
         object.__setattr__(made, name, value)
-    if asked["own_settings"] is not None:
-        object.__setattr__(made, "settings", kind.Settings.model_validate(asked["own_settings"]))
-    return as_behaviour(made, asked["object"])
+    if request["own_settings"] is not None:
+        object.__setattr__(made, "settings", kind.Settings.model_validate(request["own_settings"]))
+    return as_behaviour(made, request["object"])
 
 
 def _run(
     behaviour: Behaviour, request: Message, past: deque[PastFrame], frames: int
 ) -> tuple[Message, None]:
     contract = behaviour.contract
-    for one in request["past"]:
-        image = _image(one["image"], frames)
-        seen = from_document(one["observation"])
-        past.append(PastFrame(Frame(one["index"], one["time"], image), seen))
+    for past_frame in request["past"]:
+        image = _image(past_frame["image"], frames)
+        past_observation = from_document(past_frame["observation"])
+        past.append(
+            PastFrame(Frame(past_frame["index"], past_frame["time"], image), past_observation)
+        )
     frame = Frame(request["index"], request["time"], _image(request["image"], frames))
-    observation_so_far = from_document(request["observation"])
+    received = from_document(request["observation"])
     observation = Observation(
-        observation_so_far.frame_index,
-        observation_so_far.time,
-        observation_so_far.frame_size,
-        observation_so_far.reports,
+        received.frame_index,
+        received.time,
+        received.frame_size,
+        received.reports,
         tuple(past),
     )
     directives = tuple(decode(d) for d in request["directives"])
@@ -156,11 +162,11 @@ def _run(
 def _failure(fault: BaseException) -> Message:
     if isinstance(fault, SystemExit | GeneratorExit | KeyboardInterrupt):
         return {"fault": ["", f"it called for an exit ({type(fault).__name__})"]}
-    kind, said = type(fault).__name__, error_line(fault)
-    refused = [_refusal(f) for f in _single_faults(fault)[:LONGEST_REFUSAL]]
+    kind, text = type(fault).__name__, error_line(fault)
+    reported = [_error_document(f) for f in _single_faults(fault)[:MOST_REPORTED_FAULTS]]
     if kind in EXCEPTIONS:
-        return {"fault": [kind, said.removeprefix(f"{kind}: ")], "refused": refused}
-    return {"fault": ["", said], "refused": refused}
+        return {"fault": [kind, text.removeprefix(f"{kind}: ")], "refused": reported}
+    return {"fault": ["", text], "refused": reported}
 
 
 def _single_faults(fault: BaseException) -> list[VisupError]:
@@ -169,7 +175,7 @@ def _single_faults(fault: BaseException) -> list[VisupError]:
     return [fault] if isinstance(fault, VisupError) else []
 
 
-def _refusal(fault: VisupError) -> Message:
+def _error_document(fault: VisupError) -> Message:
     where = None if fault.where is None else str(fault.where)
     return {
         "kind": type(fault).__name__,

@@ -52,8 +52,8 @@ def close_matches(word: str, known: Iterable[str], n: int = 3, cutoff: float = 0
         # No more letters can be in common than the shorter word has, or than occur in both.
         if 2 * min(len(word), len(other)) < (cutoff - _ROUNDING) * total:
             continue
-        held = _kept_letters(other) if len(other) < _LONG else _letters(other)
-        if 2 * len(letters & held) < (cutoff - _ROUNDING) * total:
+        other_letters = _cached_letters(other) if len(other) < _LONG else _letters(other)
+        if 2 * len(letters & other_letters) < (cutoff - _ROUNDING) * total:
             continue
         matcher.set_seq1(other)
         ratio = matcher.ratio()
@@ -72,7 +72,7 @@ def _letters(word: str) -> frozenset[tuple[str, int]]:
     return frozenset((c, n) for c, count in Counter(word).items() for n in range(count))
 
 
-_kept_letters = lru_cache(maxsize=4096)(_letters)
+_cached_letters = lru_cache(maxsize=4096)(_letters)
 
 
 def closest_file(path: Path, names: Iterable[str]) -> Path | None:

@@ -34,15 +34,15 @@ def replace(record: Record, **changes: Any) -> Record:
     """
     kind = type(record)
     layout = _LAYOUTS.get(kind) or _layout(kind)
-    if layout.open:
-        return _of_open(record, changes, layout)
+    if layout.has_dict:
+        return _replace_in_dict(record, changes, layout)
     values = list(layout.read(record))
-    alike = True
+    unchanged = True
     for name, value in changes.items():
-        at = layout.place[name]
-        if values[at] is not value:
-            values[at], alike = value, False
-    return record if alike else kind(*values)
+        position = layout.index[name]
+        if values[position] is not value:
+            values[position], unchanged = value, False
+    return record if unchanged else kind(*values)
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,31 +51,31 @@ class _RecordLayout:
 
     Attributes:
         read: Reads all fields.
-        place: Field -> its position.
-        open: Whether its instances have a `__dict__` and no checks on creation: copying such records costs a
-            third. Those that change in every step are declared so (without `slots`).
+        index: Field -> its position.
+        has_dict: Whether its instances have a `__dict__` and no checks on creation: copying such records
+            costs a third. Those that change in every step are declared so (without `slots`).
     """
 
     read: Callable[[Any], tuple[Any, ...]]
-    place: Mapping[str, int]
-    open: bool
+    index: Mapping[str, int]
+    has_dict: bool
 
 
 _LAYOUTS: dict[type, _RecordLayout] = {}
 
 
-def _of_open(record: Record, changes: Mapping[str, Any], layout: _RecordLayout) -> Record:
-    held: dict[str, Any] = record.__dict__
+def _replace_in_dict(record: Record, changes: Mapping[str, Any], layout: _RecordLayout) -> Record:
+    current: dict[str, Any] = record.__dict__
     for name, value in changes.items():
-        if held[name] is not value:
+        if current[name] is not value:
             break
     else:
         return record
-    if len(held) != len(layout.place):  # cached properties of the old fields are dropped
-        held = dict(zip(layout.place, layout.read(record), strict=True))
-    values = {**held, **changes}
-    if len(values) != len(held):
-        raise KeyError(next(name for name in changes if name not in held))
+    if len(current) != len(layout.index):  # cached properties of the old fields are dropped
+        current = dict(zip(layout.index, layout.read(record), strict=True))
+    values = {**current, **changes}
+    if len(values) != len(current):
+        raise KeyError(next(name for name in changes if name not in current))
     new = object.__new__(type(record))
     # A dict that is merged at once is made in half the time of one that is filled.
     object.__setattr__(new, "__dict__", values)
@@ -85,8 +85,8 @@ def _of_open(record: Record, changes: Mapping[str, Any], layout: _RecordLayout) 
 def _layout(kind: Any) -> _RecordLayout:
     """The layout of a type of record, cached."""
     names = [f.name for f in fields(kind)]
-    one = attrgetter(names[0])
-    read = attrgetter(*names) if len(names) > 1 else lambda record: (one(record),)
-    open_ = not hasattr(kind, "__slots__") and not hasattr(kind, "__post_init__")
-    place = {name: i for i, name in enumerate(names)}
-    return _LAYOUTS.setdefault(kind, _RecordLayout(read, place, open_))
+    first_field = attrgetter(names[0])
+    read = attrgetter(*names) if len(names) > 1 else lambda record: (first_field(record),)
+    has_dict = not hasattr(kind, "__slots__") and not hasattr(kind, "__post_init__")
+    index = {name: i for i, name in enumerate(names)}
+    return _LAYOUTS.setdefault(kind, _RecordLayout(read, index, has_dict))

@@ -56,7 +56,7 @@ class RelationTable(Sequence[Relation]):
                 at = part.columns.named.get(name)
                 if at is not None and k >= 0:
                     return part.relation(*at, (objects[0], objects[1]), row, k)
-        return self._given.get((name, frozenset(objects))) if self.extra else None
+        return self._extra_by_name.get((name, frozenset(objects))) if self.extra else None
 
     def truth(self, name: str, a: int, b: int) -> Truth | None:
         """Truth of the relation of that name from a to b, or None if it is not evaluated."""
@@ -66,9 +66,9 @@ class RelationTable(Sequence[Relation]):
                 k, row = self.pair(a, b)
                 if k >= 0:
                     column, code = at
-                    held = int(part.state[column.rows[row], k])
-                    return _TRUTHS[1 if held == code else 0 if held == UNKNOWN_CODE else -1]
-        found = self._given.get((name, frozenset((a, b)))) if self.extra else None
+                    state = int(part.state[column.rows[row], k])
+                    return _TRUTHS[1 if state == code else 0 if state == UNKNOWN_CODE else -1]
+        found = self._extra_by_name.get((name, frozenset((a, b)))) if self.extra else None
         return None if found is None else found.truth
 
     def codes(self, name: str) -> list[int]:
@@ -77,15 +77,15 @@ class RelationTable(Sequence[Relation]):
             at = part.columns.named.get(name)
             if at is not None:
                 column, code = at
-                held = part.state[column.rows[0]].tolist()
-                return [1 if c == code else 0 if c == UNKNOWN_CODE else -1 for c in held]
+                states = part.state[column.rows[0]].tolist()
+                return [1 if c == code else 0 if c == UNKNOWN_CODE else -1 for c in states]
         truths = [self.truth(name, *pair) for pair in self._pairs]
         return [0 if t is None else _CODES[t] for t in truths]
 
     def holding(self, *names: str) -> tuple[Relation, ...]:
         """The true relations with the given names, by their objects."""
-        held = (self.find(name, *objects) for objects, name in self.holding_objects(*names))
-        return tuple([r for r in held if r is not None])
+        relations = (self.find(name, *objects) for objects, name in self.holding_objects(*names))
+        return tuple([r for r in relations if r is not None])
 
     def holding_objects(self, *names: str) -> list[tuple[tuple[int, ...], str]]:
         """Objects and names of the true relations with the given names, by objects; creates no records."""
@@ -134,11 +134,11 @@ class RelationTable(Sequence[Relation]):
 
         columns = tuple([part.columns for part in self.parts])
         heights = tuple([len(part.state) for part in self.parts])
-        places, code = _indices_of(columns, heights, names, len(self.ids))
+        indices, code = _indices_of(columns, heights, names, len(self.ids))
         states = [part.state.ravel() for part in self.parts]
-        codes = _truth(np.concatenate([*states, _not_evaluated()]).take(places), code)
+        codes = _truth(np.concatenate([*states, _not_evaluated()]).take(indices), code)
         if tuple(ids) != self.ids:
-            codes = self._of(codes, ids)
+            codes = self._for_ids(codes, ids)
         for r in self.extra:
             if r.name in names and len(r.objects) == 2 and set(r.objects) <= set(ids):
                 i, j = (list(ids).index(o) for o in r.objects)
@@ -146,15 +146,15 @@ class RelationTable(Sequence[Relation]):
                 codes[k, i, j] = codes[k, j, i] = _CODES[r.truth]
         return codes
 
-    def _of(self, codes: NDArray[np.int8], ids: Sequence[int]) -> NDArray[np.int8]:
+    def _for_ids(self, codes: NDArray[np.int8], ids: Sequence[int]) -> NDArray[np.int8]:
         """(k, n, n) tables for the given objects; 0 where not evaluated."""
         import numpy as np
 
         out = np.zeros((len(codes), len(ids), len(ids)), dtype=np.int8)
-        there = [n for n, i in enumerate(ids) if i in self._place]
-        here = [self._place[ids[n]] for n in there]
-        out[:, np.array(there, np.intp)[:, None], there] = codes[
-            :, np.array(here, np.intp)[:, None], here
+        rows = [n for n, i in enumerate(ids) if i in self._index]
+        source_rows = [self._index[ids[n]] for n in rows]
+        out[:, np.array(rows, np.intp)[:, None], rows] = codes[
+            :, np.array(source_rows, np.intp)[:, None], source_rows
         ]
         return out
 
@@ -172,7 +172,7 @@ class RelationTable(Sequence[Relation]):
 
     def pair(self, a: int, b: int) -> tuple[int, int]:
         """Number of a pair and its row: 0 in order, 1 reversed; number -1 if it does not exist."""
-        i, j = self._place.get(a, -1), self._place.get(b, -1)
+        i, j = self._index.get(a, -1), self._index.get(b, -1)
         if i < 0 or j < 0 or i == j:
             return -1, 0
         low, high, row = (i, j, 0) if i < j else (j, i, 1)
@@ -219,11 +219,11 @@ class RelationTable(Sequence[Relation]):
         return tuple(self)
 
     @cached_property
-    def _place(self) -> Mapping[int, int]:
+    def _index(self) -> Mapping[int, int]:
         return {object_id: i for i, object_id in enumerate(self.ids)}
 
     @cached_property
-    def _given(self) -> Mapping[tuple[str, frozenset[int]], Relation]:
+    def _extra_by_name(self) -> Mapping[tuple[str, frozenset[int]], Relation]:
         return {(r.name, frozenset(r.objects)): r for r in reversed(self.extra)}
 
 
@@ -239,8 +239,8 @@ def _indices_of(
     import numpy as np
 
     first, second = np.triu_indices(m, 1)
-    pairs, each = len(first), np.arange(len(first))
-    places = np.full((len(wanted), m, m), sum(heights) * pairs, dtype=np.intp)
+    pairs, numbers = len(first), np.arange(len(first))
+    indices = np.full((len(wanted), m, m), sum(heights) * pairs, dtype=np.intp)
     codes = np.zeros((len(wanted), 1, 1), dtype=np.int8)
     for number, part in enumerate(columns):
         begin = sum(heights[:number])
@@ -248,9 +248,9 @@ def _indices_of(
             if name in part.named:
                 column, codes[k] = part.named[name]
                 row, turned = column.rows
-                places[k, first, second] = (begin + row) * pairs + each
-                places[k, second, first] = (begin + turned) * pairs + each
-    return places, codes
+                indices[k, first, second] = (begin + row) * pairs + numbers
+                indices[k, second, first] = (begin + turned) * pairs + numbers
+    return indices, codes
 
 
 @lru_cache(maxsize=1)
@@ -263,8 +263,8 @@ def _not_evaluated() -> NDArray[np.int8]:
 
 def _truth(state: NDArray[np.int8], code: NDArray[np.int8]) -> NDArray[np.int8]:
     """1 where a state has the code, 0 where it is unknown, else -1."""
-    held = (state == code).astype("int8")
-    return held + held - (state != UNKNOWN_CODE)  # type: ignore[no-any-return]
+    holds = (state == code).astype("int8")
+    return holds + holds - (state != UNKNOWN_CODE)  # type: ignore[no-any-return]
 
 
 enable_display(RelationTable)

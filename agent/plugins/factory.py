@@ -102,9 +102,9 @@ def find_factories(where: str) -> list[BehaviourFactory]:
         BehaviourError: It is missing, does not run, or has no behaviour.
     """
     if not MODULE_PATH.fullmatch(where):
-        return _of_file(Path(where))
+        return _factories_of_file(Path(where))
     module_path, _, name = where.partition(":")
-    module = _run(lambda: importlib.import_module(module_path), where)
+    module = _imported(lambda: importlib.import_module(module_path), where)
     if not hasattr(module, name):
         known = sorted(k.__name__ for k in _own_classes(module) if hasattr(k, "contract"))
         raise BehaviourError(
@@ -150,8 +150,8 @@ def as_behaviour(made: object, where: str) -> Behaviour:
 
 def module_name(path: Path) -> str:
     """The module name of a file of behaviours; unique even for files of the same name."""
-    place = hashlib.sha256(str(path.resolve().parent).encode()).hexdigest()[:8]
-    return f"visup_plugin_{path.stem}_{place}"
+    folder_hash = hashlib.sha256(str(path.resolve().parent).encode()).hexdigest()[:8]
+    return f"visup_plugin_{path.stem}_{folder_hash}"
 
 
 def import_file(path: Path) -> ModuleType:
@@ -169,36 +169,38 @@ def import_file(path: Path) -> ModuleType:
     return module
 
 
-def _of_file(path: Path) -> list[BehaviourFactory]:
+def _factories_of_file(path: Path) -> list[BehaviourFactory]:
     if not path.is_file():
         raise BehaviourError(
             "there is no such file",
             where=str(path),
             expected="a Python file, or package.module:Class",
         )
-    module = _run(lambda: import_file(path), str(path))
-    offered = [c for c in _own_classes(module) if hasattr(c, "contract")]
-    if not offered:
+    module = _imported(lambda: import_file(path), str(path))
+    classes = [c for c in _own_classes(module) if hasattr(c, "contract")]
+    if not classes:
         raise BehaviourError(
             "the file holds no behaviour",
             where=str(path),
             expected="a class with `contract = Contract(name, gives=(...))` and `perceive`",
             hint="visup behaviours new NAME writes a complete one",
         )
-    return [BehaviourFactory(kind, str(path)) for kind in offered]
+    return [BehaviourFactory(kind, str(path)) for kind in classes]
 
 
-def _run(imported: Callable[[], ModuleType], where: str) -> ModuleType:
+def _imported(load: Callable[[], ModuleType], where: str) -> ModuleType:
     try:
-        return imported()
+        return load()
     except BehaviourError as fault:
-        place = ", ".join(str(w) for w in (_place(fault, where), fault.where) if w)
+        folder_hash = ", ".join(str(w) for w in (_place(fault, where), fault.where) if w)
         raise BehaviourError(
-            fault.what, where=place, expected=fault.expected, hint=fault.hint
+            fault.what, where=folder_hash, expected=fault.expected, hint=fault.hint
         ) from fault
     except (Exception, SystemExit) as fault:
-        said = f"{type(fault).__name__}: {fault}"
-        raise BehaviourError(f"it does not run: {said}", where=_place(fault, where)) from fault
+        error_text = f"{type(fault).__name__}: {fault}"
+        raise BehaviourError(
+            f"it does not run: {error_text}", where=_place(fault, where)
+        ) from fault
 
 
 def _place(fault: BaseException, where: str) -> str:

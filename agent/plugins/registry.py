@@ -20,7 +20,7 @@ class Registry:
     """Factories of behaviours by name. Created where an agent is wired; never global."""
 
     def __init__(self) -> None:
-        self._offers: dict[str, BehaviourFactory | EntryPoint] = {}
+        self._factories: dict[str, BehaviourFactory | EntryPoint] = {}
 
     def add(self, name: str, kind: Constructor) -> None:
         """Add a behaviour class or factory function.
@@ -40,14 +40,14 @@ class Registry:
         # `importlib_metadata`, entry points are of that one's class.
         self._add(point.name, point)
 
-    def _add(self, name: str, offer: BehaviourFactory | EntryPoint) -> None:
-        if name in self._offers:
+    def _add(self, name: str, factory: BehaviourFactory | EntryPoint) -> None:
+        if name in self._factories:
             raise BehaviourError(f"a behaviour called '{name}' is already registered")
-        self._offers[name] = offer
+        self._factories[name] = factory
 
     def names(self) -> list[str]:
         """Names in alphabetical order."""
-        return sorted(self._offers)
+        return sorted(self._factories)
 
     def where(self, name: str) -> str:
         """Location of the behaviour of that name, `package.module:Class`; nothing is imported.
@@ -55,9 +55,9 @@ class Registry:
         Raises:
             BehaviourError: No such name.
         """
-        if name not in self._offers:
+        if name not in self._factories:
             raise self._unknown(name)
-        found = self._offers[name]
+        found = self._factories[name]
         return found.where if isinstance(found, BehaviourFactory) else found.value
 
     def _unknown(self, name: str) -> BehaviourError:
@@ -73,20 +73,20 @@ class Registry:
         Raises:
             BehaviourError: No such name, or it cannot be imported.
         """
-        if name not in self._offers:
+        if name not in self._factories:
             raise self._unknown(name)
-        found = self._offers[name]
+        found = self._factories[name]
         if isinstance(found, BehaviourFactory):
             return found
         try:
-            offer = BehaviourFactory(found.load(), found.value)
+            factory = BehaviourFactory(found.load(), found.value)
         except Exception as fault:
-            said = f"{type(fault).__name__}: {fault}"
+            error_text = f"{type(fault).__name__}: {fault}"
             raise BehaviourError(
-                f"behaviour '{name}' cannot be imported: {said}", where=found.value
+                f"behaviour '{name}' cannot be imported: {error_text}", where=found.value
             ) from fault
-        self._offers[name] = offer
-        return offer
+        self._factories[name] = factory
+        return factory
 
     def make(self, name: str, settings: Mapping[str, Any] | None = None) -> Behaviour:
         """Create a behaviour.

@@ -45,11 +45,11 @@ def validate_settings(model: type | None, values: Mapping[str, Any], name: str) 
             expected="class Settings(pydantic.BaseModel)",
         )
     unknown = [_unknown(key, model.model_fields, name) for key in values if not _has(model, key)]
-    _refuse(unknown)
+    _raise_all(unknown)
     try:
         return model.model_validate(dict(values))
     except ValidationError as faults:
-        _refuse([_worded(dict(e), name) for e in faults.errors()])
+        _raise_all([_settings_error(dict(e), name) for e in faults.errors()])
         raise
 
 
@@ -111,10 +111,10 @@ def behaviour_tables(document: Mapping[str, Any], path: Path) -> Values:
         SettingsError: It has other content.
     """
     tables = document.get("behaviours", {})
-    strange = next((key for key in document if key != "behaviours"), None)
-    if strange is not None:
+    unexpected = next((key for key in document if key != "behaviours"), None)
+    if unexpected is not None:
         raise SettingsError(
-            f"'{strange}' is unknown", where=str(path), expected="tables [behaviours.NAME]"
+            f"'{unexpected}' is unknown", where=str(path), expected="tables [behaviours.NAME]"
         )
     if not isinstance(tables, dict) or not all(isinstance(t, dict) for t in tables.values()):
         raise SettingsError(
@@ -151,15 +151,15 @@ def _unknown(key: str, known: Mapping[str, object], name: str) -> VisupError:
     )
 
 
-def _worded(fault: Mapping[str, Any], name: str) -> VisupError:
+def _settings_error(fault: Mapping[str, Any], name: str) -> VisupError:
     place = ".".join(str(part) for part in (name, *fault["loc"]))
-    wanted = fault["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+    expected = fault["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
     if fault["type"] == "missing":
         return SettingsError("a setting is missing", where=place, hint=f"--set {place}=VALUE")
-    return SettingsError(f"{fault['input']!r} is not valid", where=place, expected=wanted)
+    return SettingsError(f"{fault['input']!r} is not valid", where=place, expected=expected)
 
 
-def _refuse(faults: list[VisupError]) -> None:
+def _raise_all(faults: list[VisupError]) -> None:
     if len(faults) == 1:
         raise faults[0]
     if faults:

@@ -88,9 +88,9 @@ class _StateWriter:
         if number is None:
             self._known[id(value)] = _OPEN
             self._alive.append(value)
-            made = self._made(value)
+            node = self._made(value)
             number = self._known[id(value)] = len(self.table)
-            self.table.append(made)
+            self.table.append(node)
         return [number]
 
     def _made(self, value: Any) -> _Node:
@@ -130,13 +130,13 @@ class _StateWriter:
         return ["object", name, [[n, self.node(v)] for n, v in state_of(value).items()]]
 
     def _array(self, value: NDArray[Any] | np.generic) -> int:
-        whole = np.asarray(value)
-        if whole.dtype.kind not in "biufc":
-            raise StateError(f"an array of {whole.dtype}")
+        array = np.asarray(value)
+        if array.dtype.kind not in "biufc":
+            raise StateError(f"an array of {array.dtype}")
         # The memory order affects sums in the last bits.
-        order = "F" if whole.flags.f_contiguous and not whole.flags.c_contiguous else "C"
-        self.shapes.append((whole.dtype.str, list(whole.shape), order))
-        self.arrays.append(whole.tobytes(order))  # type: ignore[arg-type]  # 'C' or 'F'
+        order = "F" if array.flags.f_contiguous and not array.flags.c_contiguous else "C"
+        self.shapes.append((array.dtype.str, list(array.shape), order))
+        self.arrays.append(array.tobytes(order))  # type: ignore[arg-type]  # 'C' or 'F'
         return len(self.arrays) - 1
 
 
@@ -214,10 +214,10 @@ class _StateReader:
         kind = _class(name)
         if not issubclass(kind, str) or issubclass(kind, Enum):
             raise ValueError(f"{name} is not a text")
-        made = str.__new__(kind, text)
+        instance = str.__new__(kind, text)
         for attribute, node in attributes:
-            object.__setattr__(made, attribute, self._of(node))
-        return made
+            object.__setattr__(instance, attribute, self._of(node))
+        return instance
 
     def csr(self, *parts: _Node) -> Any:
         from scipy.sparse import csr_matrix
@@ -265,13 +265,13 @@ def _class(name: str) -> type:
 
 
 def _arrays(shapes: list[tuple[str, list[int], str]], body: memoryview) -> list[NDArray[Any]]:
-    out, at = [], 0
+    found, offset = [], 0
     for dtype_name, shape, order in shapes:
         dtype = np.dtype(dtype_name)
         if dtype.kind not in "biufc":
             raise ValueError(f"an array of {dtype}")
         count = int(np.prod(shape, dtype=np.int64))
-        flat = np.frombuffer(body, dtype, count, at).copy()
-        out.append(flat.reshape(shape, order="F" if order == "F" else "C"))
-        at += flat.nbytes
-    return out
+        flat = np.frombuffer(body, dtype, count, offset).copy()
+        found.append(flat.reshape(shape, order="F" if order == "F" else "C"))
+        offset += flat.nbytes
+    return found

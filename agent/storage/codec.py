@@ -32,7 +32,7 @@ from visup.agent.storage.mask_codec import (
     chain_to_contour,
     contour_to_chain,
     mask_to_runs,
-    room,
+    pixel_limit,
     runs_to_mask,
 )
 from visup.agent.storage.text_file import check_room
@@ -44,10 +44,10 @@ LARGEST_REPORT_BYTES = 32 * 2**20
 MOST_BITS = 1024
 """Longest integer, bits: longer ones could not be read back."""
 
-_LEVEL = 1  # zlib: higher levels save a few per cent and take several times as long
+_COMPRESSION_LEVEL = 1  # zlib: higher levels save a few per cent and take several times as long
 _PLAIN = frozenset({type(None), bool, float, str})
 """Types written unchanged; so are integers up to `MOST_BITS`."""
-_LEFT_OUT = (records.Frame, records.Observation, mind.Mind)
+_NOT_ENCODED = (records.Frame, records.Observation, mind.Mind)
 _TYPES: Mapping[str, type] = MappingProxyType(
     {
         name: kind
@@ -56,7 +56,7 @@ _TYPES: Mapping[str, type] = MappingProxyType(
         if isinstance(kind, type)
         and kind.__module__ == module.__name__
         and (is_dataclass(kind) or issubclass(kind, Enum))
-        and kind not in _LEFT_OUT
+        and kind not in _NOT_ENCODED
     }
 )
 _FIELDS = {k: tuple(f.name for f in fields(k)) for k in _TYPES.values() if is_dataclass(k)}
@@ -83,8 +83,10 @@ def pack_observation(observation: Observation) -> bytes:
     try:
         text = _checked_text(document)
     except ValueError:
-        text = _checked_text({**document, "reports": [_as_lost(r) for r in document["reports"]]})
-    return zlib.compress(text, _LEVEL)
+        text = _checked_text(
+            {**document, "reports": [_without_unreadable(r) for r in document["reports"]]}
+        )
+    return zlib.compress(text, _COMPRESSION_LEVEL)
 
 
 def _checked_text(document: Any) -> bytes:
@@ -100,15 +102,15 @@ def _checked_text(document: Any) -> bytes:
     return text
 
 
-def _as_lost(report: dict[str, Any]) -> dict[str, Any]:
+def _without_unreadable(report: dict[str, Any]) -> dict[str, Any]:
     """A report unchanged, or without percepts if they could not be read back."""
     try:
         if len(_checked_text(report)) <= LARGEST_REPORT_BYTES:
             return report
-        lost = "more than a step has room for"
+        reason = "more than a step has room for"
     except ValueError as fault:
-        lost = f"what cannot be written ({str(fault)[:80]})"
-    return {k: v for k, v in report.items() if k != "percepts"} | {"lost": lost}
+        reason = f"what cannot be written ({str(fault)[:80]})"
+    return {k: v for k, v in report.items() if k != "percepts"} | {"lost": reason}
 
 
 def unpack_observation(data: bytes, where: str = "") -> Observation:
@@ -142,13 +144,13 @@ def to_document(observation: Observation) -> dict[str, Any]:
     }
 
 
-def from_document(written: Mapping[str, Any]) -> Observation:
+def from_document(document: Mapping[str, Any]) -> Observation:
     """The observation of a document; reports whose values were not recorded count as rested."""
-    width, height = written["frame_size"]
-    with room():
-        reports = tuple(_report_of(r) for r in written["reports"])
+    width, height = document["frame_size"]
+    with pixel_limit():
+        reports = tuple(_report_of(r) for r in document["reports"])
     return Observation(
-        int(written["frame_index"]), float(written["time"]), (int(width), int(height)), reports
+        int(document["frame_index"]), float(document["time"]), (int(width), int(height)), reports
     )
 
 
@@ -172,24 +174,26 @@ def encode_percept(p: Percept) -> list[Any]:
     return [p.kind, encode(p.value), encode(p.time), p.source, encode(p.confidence)]
 
 
-def decode_percept(written: list[Any]) -> Percept:
+def decode_percept(document: list[Any]) -> Percept:
     """Decode a percept, without validating it.
 
     Raises:
         ValueError, TypeError, KeyError: It is not valid.
     """
-    kind, value, time, source, confidence = written
+    kind, value, time, source, confidence = document
     return Percept(str(kind), decode(value), decode(time), str(source), decode(confidence))
 
 
-def _report_of(written: Mapping[str, Any]) -> Report:
-    gives = tuple(str(k) for k in written["gives"])
-    if "lost" in written:
-        error = f"its percepts were not recorded: {written['lost']}"
-        return Report(str(written["behaviour"]), ReportState.RESTED, gives, error=error)
-    percepts = tuple(decode_percept(p) for p in written["percepts"])
-    state = ReportState(written["state"])
-    return Report(str(written["behaviour"]), state, gives, percepts, str(written.get("error", "")))
+def _report_of(document: Mapping[str, Any]) -> Report:
+    gives = tuple(str(k) for k in document["gives"])
+    if "lost" in document:
+        error = f"its percepts were not recorded: {document['lost']}"
+        return Report(str(document["behaviour"]), ReportState.RESTED, gives, error=error)
+    percepts = tuple(decode_percept(p) for p in document["percepts"])
+    state = ReportState(document["state"])
+    return Report(
+        str(document["behaviour"]), state, gives, percepts, str(document.get("error", ""))
+    )
 
 
 def encode(value: Any) -> Any:
@@ -202,7 +206,7 @@ def encode(value: Any) -> Any:
     if kind in _PLAIN:
         return value
     if kind is int:
-        return _whole(value)
+        return _integer(value)
     if kind is Region:
         return _region(value)
     if kind in _FIELDS:
@@ -218,7 +222,7 @@ def encode(value: Any) -> Any:
     if kind is dict or kind is MappingProxyType:
         return _mapping(value)
     if isinstance(value, np.ma.MaskedArray) and value.dtype.kind in "biufc":
-        return {"$": "masked", "of": _array(value.filled(0)), "hidden": _array(_hidden(value))}
+        return {"$": "masked", "of": _array(value.filled(0)), "hidden": _array(_masked(value))}
     if isinstance(value, np.ndarray | np.generic) and value.dtype.kind in "biufc":
         return _array(value)
     if kind is frozenset or kind is set:
@@ -247,10 +251,10 @@ def decode(value: Any) -> Any:
         return _region_of(value)
     if tag in _TYPES:
         return _record_of(_TYPES[tag], value)
-    return _OTHERS[tag](value)
+    return _DECODERS[tag](value)
 
 
-def _whole(value: int) -> int:
+def _integer(value: int) -> int:
     if value.bit_length() > MOST_BITS:
         raise UnsupportedTypeError(f"a whole number of {value.bit_length()} bits")
     return value
@@ -259,8 +263,8 @@ def _whole(value: int) -> int:
 def _record(kind: type, value: Any) -> dict[str, Any]:
     out: dict[str, Any] = {"$": kind.__name__}
     for name in _FIELDS[kind]:
-        held = getattr(value, name)
-        out[name] = held if type(held) in _PLAIN else encode(held)
+        field_value = getattr(value, name)
+        out[name] = field_value if type(field_value) in _PLAIN else encode(field_value)
     return out
 
 
@@ -271,43 +275,43 @@ def _mapping(value: Mapping[Any, Any]) -> dict[str, Any]:
     return {"$": "map" if type(value) is dict else "frozenmap", "of": pairs}
 
 
-def _record_of(kind: type, written: Mapping[str, Any]) -> Any:
+def _record_of(kind: type, document: Mapping[str, Any]) -> Any:
     if kind not in _FIELDS:
-        return kind(written["of"])
-    given = {n: v if type(v) in _PLAIN else decode(v) for n, v in written.items()}
-    del given["$"]
-    return kind(**given)
+        return kind(document["of"])
+    values = {n: v if type(v) in _PLAIN else decode(v) for n, v in document.items()}
+    del values["$"]
+    return kind(**values)
 
 
 def _array(value: NDArray[Any] | np.generic) -> dict[str, Any]:
-    whole = np.asarray(value)
-    little = whole.astype(whole.dtype.newbyteorder("<"), copy=False)
+    array = np.asarray(value)
+    little = array.astype(array.dtype.newbyteorder("<"), copy=False)
     return {
         "$": "array" if isinstance(value, np.ndarray) else "scalar",
         "dtype": little.dtype.str,
-        "shape": list(whole.shape),
+        "shape": list(array.shape),
         "of": base64.b64encode(np.ascontiguousarray(little).tobytes()).decode(),
     }
 
 
-def _hidden(value: Any) -> NDArray[np.bool_]:
+def _masked(value: Any) -> NDArray[np.bool_]:
     return np.ma.getmaskarray(value)
 
 
-def _masked_of(written: Mapping[str, Any]) -> Any:
-    return np.ma.MaskedArray(_array_of(written["of"]), _array_of(written["hidden"]))
+def _masked_of(document: Mapping[str, Any]) -> Any:
+    return np.ma.MaskedArray(_array_of(document["of"]), _array_of(document["hidden"]))
 
 
-def _array_of(written: Mapping[str, Any]) -> NDArray[Any]:
-    dtype = np.dtype(str(written["dtype"]))
+def _array_of(document: Mapping[str, Any]) -> NDArray[Any]:
+    dtype = np.dtype(str(document["dtype"]))
     if dtype.kind not in "biufc":
         raise ValueError(f"an array of {dtype}")
-    flat = np.frombuffer(base64.b64decode(written["of"]), dtype)
+    flat = np.frombuffer(base64.b64decode(document["of"]), dtype)
     # As newly created arrays: writable, in native byte order.
-    return flat.astype(dtype.newbyteorder("=")).reshape([int(n) for n in written["shape"]])
+    return flat.astype(dtype.newbyteorder("=")).reshape([int(n) for n in document["shape"]])
 
 
-_OTHERS: dict[str, Callable[[Mapping[str, Any]], Any]] = {
+_DECODERS: dict[str, Callable[[Mapping[str, Any]], Any]] = {
     "tuple": lambda written: tuple([v if type(v) in _PLAIN else decode(v) for v in written["of"]]),
     "set": lambda written: {decode(v) for v in written["of"]},
     "frozenset": lambda written: frozenset(decode(v) for v in written["of"]),
@@ -320,7 +324,7 @@ _OTHERS: dict[str, Callable[[Mapping[str, Any]], Any]] = {
 }
 
 
-_SHOWN = tuple(n for n in _FIELDS[Region] if n not in ("mask", "contour", "bbox"))
+_REGION_FIELDS = tuple(n for n in _FIELDS[Region] if n not in ("mask", "contour", "bbox"))
 
 
 def _region(r: Region) -> dict[str, Any]:
@@ -330,19 +334,21 @@ def _region(r: Region) -> dict[str, Any]:
         "mask": mask_to_runs(r.mask),
         "contour": contour_to_chain(r.contour) or encode(r.contour),
     }
-    for name in _SHOWN:
-        held = getattr(r, name)
-        out[name] = held if type(held) in _PLAIN else encode(held)
+    for name in _REGION_FIELDS:
+        field_value = getattr(r, name)
+        out[name] = field_value if type(field_value) in _PLAIN else encode(field_value)
     return out
 
 
-def _region_of(written: Mapping[str, Any]) -> Region:
-    x, y, w, h = (int(n) for n in written["bbox"])
-    given = {n: decode(v) for n, v in written.items() if n not in ("$", "bbox", "mask", "contour")}
-    mask = runs_to_mask(written["mask"], (h, w))
+def _region_of(document: Mapping[str, Any]) -> Region:
+    x, y, w, h = (int(n) for n in document["bbox"])
+    values = {
+        n: decode(v) for n, v in document.items() if n not in ("$", "bbox", "mask", "contour")
+    }
+    mask = runs_to_mask(document["mask"], (h, w))
     return Region(
-        bbox=(x, y, w, h), mask=mask, contour=np.asarray(decode(written["contour"])), **given
+        bbox=(x, y, w, h), mask=mask, contour=np.asarray(decode(document["contour"])), **values
     )
 
 
-_OTHERS["chain"] = chain_to_contour
+_DECODERS["chain"] = chain_to_contour

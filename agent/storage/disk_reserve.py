@@ -12,7 +12,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-TRY_AGAIN = 25
+CALLS_BEFORE_RETRY = 25
 """Calls skipped after one that found no space."""
 
 
@@ -29,26 +29,26 @@ class PageReserve:
     size: int
     fill: str
     clear: str
-    _left_out: int = 0
+    _calls_to_skip: int = 0
 
     def keep(self, db: sqlite3.Connection) -> None:
         """Refill the reserve if needed; without space it is tried again later."""
-        if not self.size or self._left_out > 0:
-            self._left_out -= 1
+        if not self.size or self._calls_to_skip > 0:
+            self._calls_to_skip -= 1
             return
         with suppress(sqlite3.Error):
-            (page,) = db.execute("PRAGMA page_size").fetchone()
-            (free,) = db.execute("PRAGMA freelist_count").fetchone()
-            if 2 * free * page >= self.size:
+            (page_bytes,) = db.execute("PRAGMA page_size").fetchone()
+            (free_pages,) = db.execute("PRAGMA freelist_count").fetchone()
+            if 2 * free_pages * page_bytes >= self.size:
                 return
-            self._left_out = TRY_AGAIN
+            self._calls_to_skip = CALLS_BEFORE_RETRY
             # Two transactions: pages allocated and freed in one are never written.
-            db.execute(self.fill, (self.size - free * page,))
+            db.execute(self.fill, (self.size - free_pages * page_bytes,))
             db.execute(self.clear)
-            self._left_out = 0
+            self._calls_to_skip = 0
 
 
-def lengthen(path: Path, size: int) -> None:
+def preallocate(path: Path, size: int) -> None:
     """Extend a file to its full length in advance.
 
     Args:
@@ -58,11 +58,11 @@ def lengthen(path: Path, size: int) -> None:
     Raises:
         OSError: There is no space.
     """
-    handle = os.open(path, os.O_WRONLY | os.O_CREAT, 0o644)
+    descriptor = os.open(path, os.O_WRONLY | os.O_CREAT, 0o644)
     try:
-        missing = size - os.fstat(handle).st_size
-        os.lseek(handle, 0, os.SEEK_END)
+        missing = size - os.fstat(descriptor).st_size
+        os.lseek(descriptor, 0, os.SEEK_END)
         while missing > 0:
-            missing -= os.write(handle, bytes(missing))
+            missing -= os.write(descriptor, bytes(missing))
     finally:
-        os.close(handle)
+        os.close(descriptor)

@@ -19,7 +19,7 @@ WAIT_S = 60.0
 
 
 def acquire_lock(
-    path: Path, what: str, wait_s: float = 0.0, *, again: bool = False
+    path: Path, what: str, wait_s: float = 0.0, *, reentrant: bool = False
 ) -> BaseFileLock:
     """Acquire the write lock of a file, which the caller must release.
 
@@ -27,22 +27,22 @@ def acquire_lock(
         path: The file to be written; it need not exist.
         what: Description for the message, such as 'this run'.
         wait_s: How long to wait for another writer, seconds.
-        again: Whether the lock is re-entrant for its thread.
+        reentrant: Whether the lock is re-entrant for its thread.
 
     Raises:
         OutputError: Another writer holds it, or locking is not possible there.
     """
     if not path.parent.is_dir() or not path.name:
         raise _unwritable(path, what, "there is no such folder")
-    lock = FileLock(lock_path(path), is_singleton=again)
+    lock = FileLock(lock_path(path), is_singleton=reentrant)
     try:
         lock.acquire(timeout=wait_s, poll_interval=0.02)
-    except Timeout as held:
+    except Timeout as timeout:
         raise OutputError(
             f"another visup is writing {what}",
             where=str(path),
             hint="wait until it is done, or stop it",
-        ) from held
+        ) from timeout
     except OSError as fault:
         raise _unwritable(path, what, fault.strerror or str(fault)) from fault
     return lock
@@ -53,9 +53,9 @@ def lock_path(path: Path) -> Path:
     return path.with_name(f".{path.name}.lock")
 
 
-def _unwritable(path: Path, what: str, why: str) -> OutputError:
+def _unwritable(path: Path, what: str, reason: str) -> OutputError:
     return OutputError(
-        f"{what} cannot be written ({why})",
+        f"{what} cannot be written ({reason})",
         where=str(path),
         hint="check that the folder exists, is writable and has room",
     )
@@ -64,7 +64,7 @@ def _unwritable(path: Path, what: str, why: str) -> OutputError:
 @contextmanager
 def only_writer(path: Path, what: str) -> Iterator[None]:
     """Hold the lock of a file while changing it, after waiting for others; see `acquire_lock`."""
-    lock = acquire_lock(path, what, WAIT_S, again=True)
+    lock = acquire_lock(path, what, WAIT_S, reentrant=True)
     try:
         yield
     finally:

@@ -97,14 +97,14 @@ class Journal:
         self.path = path
         self.last_frame: int | None = None
         self._limits = limits or JournalLimits()
-        self._begun: float | None = None
+        self._segment_begin: float | None = None
         self._last_event = 0
         self._sizes: list[int] = []
         self._reserve = PageReserve(self._limits.reserve_bytes, _FILL, _CLEAR)
         self._lock = acquire_lock(path, "this run")
         try:
             if resume:
-                self._go_on()
+                self._resume()
             else:
                 self._begin()
         except BaseException:
@@ -128,9 +128,9 @@ class Journal:
         Raises:
             OutputError: The disk is full or the file has become unwritable; earlier steps stay.
         """
-        seen = pack_observation(step.observation)
+        observation = pack_observation(step.observation)
         text = to_json(summary(step)).decode()
-        row = (step.frame_index, step.time, text, seen, zlib.crc32(seen))
+        row = (step.frame_index, step.time, text, observation, zlib.crc32(observation))
         statements: list[Statement] = [("INSERT INTO steps VALUES (?, ?, ?, ?, ?)", row)]
         statements += [
             ("INSERT INTO events VALUES (?, ?, ?, ?, ?, ?)", (number, *_event_row(e)))
@@ -145,8 +145,8 @@ class Journal:
         self._write(statements, durable=bool(step.events or step.alerts))
         self._last_event += len(step.events)
         self.last_frame = step.frame_index
-        self._begun = step.time if self._begun is None else self._begun
-        self._sizes[-1] += len(seen) + len(text)
+        self._segment_begin = step.time if self._segment_begin is None else self._segment_begin
+        self._sizes[-1] += len(observation) + len(text)
         self._reserve.keep(self._db)
 
     def close(self) -> None:
@@ -186,19 +186,19 @@ class Journal:
         except (sqlite3.Error, OSError) as fault:
             raise _unwritable(path, fault) from fault
         self._sizes.append(0)
-        self._begun = None
+        self._segment_begin = None
         if number > 1:
             self.note(segment=number)
 
-    def _go_on(self) -> None:
+    def _resume(self) -> None:
         # The last one stays open: closing it would remove the log, and with it the reserve.
-        *earlier, self._db = filter(None, map(self._take_over, segments(self.path)))
+        *earlier, self._db = filter(None, map(self._reopened, segments(self.path)))
         for db in earlier:
             db.close()
         self._durable = False
         self._reserve.keep(self._db)
 
-    def _take_over(self, path: Path) -> sqlite3.Connection | None:
+    def _reopened(self, path: Path) -> sqlite3.Connection | None:
         """Open a segment and count its content; None if the run was killed before it was begun."""
         try:
             db = _connected(path, self._limits.reserve_bytes)
@@ -206,7 +206,7 @@ class Journal:
                 db.close()
                 return None
             check_version(db, path)
-            last, begun, size = db.execute(
+            last, begin, size = db.execute(
                 "SELECT max(frame_index), min(time), coalesce(sum(length(seen) + length(summary)), 0)"
                 " FROM steps"
             ).fetchone()
@@ -215,15 +215,18 @@ class Journal:
             raise _unwritable(path, fault) from fault
         self.last_frame = last if last is not None else self.last_frame
         self._last_event = max(self._last_event, event)
-        self._begun = begun
+        self._segment_begin = begin
         self._sizes.append(size)
         return db
 
     def _is_full(self, time: float) -> bool:
-        if self._begun is None:
+        if self._segment_begin is None:
             return False
         limits = self._limits
-        return self._sizes[-1] >= limits.segment_bytes or time - self._begun >= limits.segment_s
+        return (
+            self._sizes[-1] >= limits.segment_bytes
+            or time - self._segment_begin >= limits.segment_s
+        )
 
     def _next_segment(self) -> None:
         number = len(self._sizes) + 1
@@ -232,11 +235,11 @@ class Journal:
         try:
             old.execute("PRAGMA wal_checkpoint(TRUNCATE)")
             old.close()
-            self._make_room()
+            self._drop_oldest_steps()
         except sqlite3.Error as fault:
             raise _unwritable(self.path, fault) from fault
 
-    def _make_room(self) -> None:
+    def _drop_oldest_steps(self) -> None:
         """Drop the steps of the oldest segments beyond `keep_bytes`."""
         keep = self._limits.keep_bytes
         for i in range(len(self._sizes) - 1):
@@ -296,18 +299,18 @@ def check_schema(db: sqlite3.Connection, path: Path) -> None:
         OutputError: It is none.
     """
     db.execute("PRAGMA trusted_schema = OFF")
-    if sorted(db.execute(_SCHEMA_OF)) != _expected_schema():
+    if sorted(db.execute(_SCHEMA_QUERY)) != _expected_schema():
         raise OutputError("this is not a journal", where=str(path), expected="a run of visup")
 
 
-_SCHEMA_OF = "SELECT type, name, tbl_name, sql FROM sqlite_schema"
+_SCHEMA_QUERY = "SELECT type, name, tbl_name, sql FROM sqlite_schema"
 
 
 @cache
 def _expected_schema() -> list[Any]:
     with closing(sqlite3.connect(":memory:")) as db:
         db.executescript(SCHEMA)
-        return sorted(db.execute(_SCHEMA_OF))
+        return sorted(db.execute(_SCHEMA_QUERY))
 
 
 def check_version(db: sqlite3.Connection, path: Path) -> None:
@@ -336,7 +339,7 @@ def summary(step: Step) -> dict[str, Any]:
     return {
         "objects": [object_summary(b) for _, b in sorted(mind.objects.items())],
         "couplings": to_jsonable(mind.couplings),
-        "tasks": [_task_line(t) for t in mind.tasks],
+        "tasks": [_task_summary(t) for t in mind.tasks],
         "health": to_jsonable(mind.health),
         "unknown": to_jsonable(mind.unknown),
         "directives": to_jsonable(step.directives),
@@ -344,7 +347,7 @@ def summary(step: Step) -> dict[str, Any]:
     }
 
 
-def _task_line(task: TaskBelief) -> dict[str, Any]:
+def _task_summary(task: TaskBelief) -> dict[str, Any]:
     return {
         "task": task.task,
         "verdict": task.verdict.value,

@@ -28,14 +28,14 @@ _LARGEST_RECORD = 16 * 2**20
 """Maximum characters of a record other than a step."""
 
 
-def _nearest_run(run: Path) -> str | None:
+def _similar_run_hint(run: Path) -> str | None:
     """A hint with a run of a similar name in the same folder, or None."""
     try:
         runs = [p.name for p in run.parent.iterdir() if (p / JOURNAL).is_file()]
     except OSError:
         return None
-    near = closest_file(run, runs)
-    return f"did you mean {near}?" if near and near != run else None
+    nearest = closest_file(run, runs)
+    return f"did you mean {nearest}?" if nearest and nearest != run else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +64,7 @@ class Recording:
                 "there is no recorded run here",
                 where=str(run),
                 expected=f"a run folder with {JOURNAL}",
-                hint=_nearest_run(run),
+                hint=_similar_run_hint(run),
             )
         recording = cls(path)
         for _ in recording._rows("SELECT 1 FROM steps, run LIMIT 1"):
@@ -74,7 +74,7 @@ class Recording:
     def facts(self) -> Mapping[str, Any]:
         """Facts about the run, from `Journal.note`."""
         rows = self._rows("SELECT key, value FROM run")
-        return {key: self._loaded(value) for _, (key, value) in rows}
+        return {key: self._parsed(value) for _, (key, value) in rows}
 
     def events(self) -> Iterator[dict[str, Any]]:
         """Events as in `events.jsonl`, in order."""
@@ -150,8 +150,8 @@ class Recording:
         Args:
             frames: Numbers of a few hundred frames at most.
         """
-        places = ",".join("?" * len(frames))
-        sql = f"SELECT frame_index, time, summary FROM steps WHERE frame_index IN ({places})"
+        placeholders = ",".join("?" * len(frames))
+        sql = f"SELECT frame_index, time, summary FROM steps WHERE frame_index IN ({placeholders})"
         for _, (index, time, text) in self._rows(f"{sql} ORDER BY frame_index", tuple(frames)):
             try:
                 yield {"frame_index": index, "time": time, **self._record(text)}
@@ -193,11 +193,11 @@ class Recording:
     def written(self) -> float:
         """When it was last written to, seconds since the epoch."""
         last = segments(self.path)[-1]
-        log = last.with_name(last.name + "-wal")
-        return max(p.stat().st_mtime for p in (last, log) if p.exists())
+        wal = last.with_name(last.name + "-wal")
+        return max(p.stat().st_mtime for p in (last, wal) if p.exists())
 
     def _rows(
-        self, sql: str, given: tuple[Any, ...] = ()
+        self, sql: str, parameters: tuple[Any, ...] = ()
     ) -> Iterator[tuple[Path, tuple[Any, ...]]]:
         for path in segments(self.path):
             try:
@@ -205,18 +205,18 @@ class Recording:
                     if path != self.path and is_empty(db):
                         continue
                     check_version(db, path)
-                    for row in db.execute(sql, given):
+                    for row in db.execute(sql, parameters):
                         yield path, row
             except (sqlite3.Error, ValueError, TypeError, OverflowError) as fault:
                 raise _unreadable(path, fault) from fault
 
     def _record(self, text: Any) -> dict[str, Any]:
-        loaded = self._loaded(text)
+        loaded = self._parsed(text)
         if not isinstance(loaded, dict):
             raise _damaged(str(self.path), "a record is not a JSON object")
         return loaded
 
-    def _loaded(self, text: Any) -> Any:
+    def _parsed(self, text: Any) -> Any:
         try:
             if not isinstance(text, str) or len(text) > _LARGEST_RECORD:
                 raise ValueError(f"a record is no text, or longer than {_LARGEST_RECORD >> 20} MB")
@@ -242,19 +242,19 @@ def checked(observation: Observation, where: str) -> Observation:
     """
     size = observation.frame_size
     try:
-        fine = math.isfinite(observation.time) and all(0 < side <= LARGEST_SIDE for side in size)
-        expect(fine, f"a frame of {size[0]}x{size[1]} pixels at {observation.time} s", "a frame")
+        valid = math.isfinite(observation.time) and all(0 < side <= LARGEST_SIDE for side in size)
+        expect(valid, f"a frame of {size[0]}x{size[1]} pixels at {observation.time} s", "a frame")
         for report in observation.reports:
             for p in report.percepts:
-                fine = is_finite(p.time) and is_finite(p.confidence) and 0 <= p.confidence <= 1
-                expect(fine, f"'{p.kind}' has no time or confidence", "numbers")
+                valid = is_finite(p.time) and is_finite(p.confidence) and 0 <= p.confidence <= 1
+                expect(valid, f"'{p.kind}' has no time or confidence", "numbers")
                 check_value(p.kind, p.value, size, f"'{p.kind}'")
     except (BehaviourError, TypeError, ValueError, AttributeError, OverflowError) as fault:
-        raise _damaged(where, str(fault)[:LONGEST_FAULT]) from fault
+        raise _damaged(where, str(fault)[:LONGEST_ERROR_TEXT]) from fault
     return observation
 
 
-LONGEST_FAULT = 300
+LONGEST_ERROR_TEXT = 300
 
 
 def is_run(place: str | Path) -> bool:
@@ -310,10 +310,10 @@ def _unreadable(path: Path, fault: Exception) -> OutputError:
     try:
         with path.open("rb"):
             pass
-    except OSError as denied:
-        why = denied.strerror or str(denied)
+    except OSError as error:
+        reason = error.strerror or str(error)
         return OutputError(
-            f"the journal cannot be read ({why})",
+            f"the journal cannot be read ({reason})",
             where=str(path),
             hint="check the permissions of the file and its folder",
         )

@@ -57,18 +57,18 @@ def to_jsonable(value: Any) -> Any:
     if isinstance(value, tuple | list | RelationTable):
         return [to_jsonable(v) for v in value]
     if is_dataclass(value) and not isinstance(value, type):
-        return {name: to_jsonable(getattr(value, name)) for name in _shown(kind)}
+        return {name: to_jsonable(getattr(value, name)) for name in _written_fields(kind)}
     return str(value)
 
 
 @cache
-def _shown(kind: Any) -> tuple[str, ...]:
+def _written_fields(kind: Any) -> tuple[str, ...]:
     """The fields of a type of record that are written."""
-    hidden = _HIDDEN.get(kind, frozenset())
-    return tuple(f.name for f in fields(kind) if f.name not in hidden)
+    omitted = _OMITTED.get(kind, frozenset())
+    return tuple(f.name for f in fields(kind) if f.name not in omitted)
 
 
-_HIDDEN: Mapping[type, frozenset[str]] = {
+_OMITTED: Mapping[type, frozenset[str]] = {
     Region: frozenset({"mask", "contour", "motion"}),
     Mind: frozenset({"memory"}),
 }

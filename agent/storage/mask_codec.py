@@ -19,24 +19,24 @@ MOST_PIXELS = 2**28
 """Maximum number of pixels and points of all masks and contours of a step together."""
 
 
-_left: ContextVar[list[int]] = ContextVar("pixels that are left")
+_pixels_left: ContextVar[list[int]] = ContextVar("pixels that are left")
 
 
 @contextmanager
-def room() -> Iterator[None]:
+def pixel_limit() -> Iterator[None]:
     """A context in which the total size of decoded masks and contours is limited."""
-    token = _left.set([MOST_PIXELS])
+    token = _pixels_left.set([MOST_PIXELS])
     try:
         yield
     finally:
-        _left.reset(token)
+        _pixels_left.reset(token)
 
 
-def _take(pixels: int) -> None:
+def _reserve(pixels: int) -> None:
     """Account for memory before it is taken."""
-    left = _left.get([MOST_PIXELS])
-    left[0] -= pixels
-    if pixels < 0 or left[0] < 0:
+    remaining = _pixels_left.get([MOST_PIXELS])
+    remaining[0] -= pixels
+    if pixels < 0 or remaining[0] < 0:
         raise ValueError(f"its masks have more than {MOST_PIXELS} pixels")
 
 
@@ -55,7 +55,7 @@ def runs_to_mask(lengths: list[int], shape: tuple[int, int]) -> NDArray[np.bool_
     Raises:
         ValueError: The runs do not sum to that many pixels.
     """
-    _take(shape[0] * shape[1])
+    _reserve(shape[0] * shape[1])
     counts = np.asarray(lengths, np.int64)
     if counts.ndim != 1 or (counts < 0).any() or int(counts.sum()) != shape[0] * shape[1]:
         raise ValueError("the runs of a mask do not fill its box")
@@ -98,17 +98,17 @@ def contour_to_chain(contour: NDArray[np.float32]) -> dict[str, Any] | None:
     return {"$": "chain", "from": first, "of": _CODE[moves].tobytes().decode()}
 
 
-def chain_to_contour(written: Mapping[str, Any]) -> NDArray[np.float32]:
+def chain_to_contour(document: Mapping[str, Any]) -> NDArray[np.float32]:
     """The contour of a chain code, (N, 2) pixels.
 
     Raises:
         ValueError: It is not valid, or exceeds the limit.
     """
-    digits = np.frombuffer(written["of"].encode(), np.uint8) - ord("0")
+    digits = np.frombuffer(document["of"].encode(), np.uint8) - ord("0")
     if len(digits) and digits.max() > 7:
         raise ValueError("a chain code has digits from 0 to 7")
-    x, y = written["from"]
-    _take(len(digits))
+    x, y = document["from"]
+    _reserve(len(digits))
     points = np.empty((len(digits) + 1, 2), np.int64)
     points[0] = int(x), int(y)
     points[1:] = _CHAIN[digits]

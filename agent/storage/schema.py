@@ -63,12 +63,12 @@ class Chain(_Strict):
     )
 
 
-def _plain(hint: Any) -> Any:
+def _document_type(hint: Any) -> Any:
     """The type in a document of a field of a record."""
     if hint is float:
         return Number
     if isinstance(hint, UnionType):
-        return reduce(or_, (_plain(part) for part in get_args(hint)))
+        return reduce(or_, (_document_type(part) for part in get_args(hint)))
     if get_origin(hint) is tuple:
         return Tuple
     if get_origin(hint) is np.ndarray:
@@ -80,25 +80,26 @@ def _plain(hint: Any) -> Any:
     return hint
 
 
-def _tagged(kind: type, says: str, **fields: Any) -> Any:
+def _tagged(kind: type, description: str, **fields: Any) -> Any:
     name = kind.__name__
     tag: Any = (Literal[name], Field(alias="$"))
     return create_model(
         f"{name}Value",
         __base__=_Strict,
-        __doc__=f"{says} (`visup.agent.{name}`).",
+        __doc__=f"{description} (`visup.agent.{name}`).",
         tag=tag,
         **fields,
     )
 
 
-def _record(kind: type, says: str, **written: Any) -> Any:
+def _record(kind: type, description: str, **replacements: Any) -> Any:
     """The schema of a record: its fields in order, with replacements for those encoded differently."""
     hints = get_type_hints(kind, localns={"np": np, "NDArray": NDArray})
     fields = {
-        f.name: (written.get(f.name) or _plain(hints[f.name]), ...) for f in dataclass_fields(kind)
+        f.name: (replacements.get(f.name) or _document_type(hints[f.name]), ...)
+        for f in dataclass_fields(kind)
     }
-    return _tagged(kind, says, **fields)
+    return _tagged(kind, description, **fields)
 
 
 _BOX = Annotated[list[int], Field(min_length=4, max_length=4, description="x, y, width, height")]

@@ -8,7 +8,7 @@ from errno import EFBIG, EINVAL
 from pathlib import Path
 from typing import IO
 
-PIECE_BYTES = 2**20
+CHUNK_BYTES = 2**20
 LARGEST_TEXT_BYTES = 2**20
 """Maximum size of tasks, rules, zones and settings; the largest shipped ones have a hundredth of it."""
 
@@ -30,24 +30,24 @@ def read_bounded(path: Path, most: int) -> bytes:
         OSError: It cannot be read, is a device or a pipe, or is larger.
     """
     # Opening or reading a device or pipe may block forever.
-    handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
-    with open(handle, "rb") as file:  # noqa: PTH123  # opens a descriptor
-        facts = os.fstat(handle)
-        if not stat.S_ISREG(facts.st_mode):
+    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
+    with open(descriptor, "rb") as file:  # noqa: PTH123  # opens a descriptor
+        status = os.fstat(descriptor)
+        if not stat.S_ISREG(status.st_mode):
             raise OSError(EINVAL, "it is not a file", str(path))
-        data = b"" if facts.st_size > most else _read_at_most(file, most + 1)
-    if max(len(data), facts.st_size) > most:
+        data = b"" if status.st_size > most else _read_at_most(file, most + 1)
+    if max(len(data), status.st_size) > most:
         raise OSError(EFBIG, f"it is larger than {_size(most)}", str(path))
     return data
 
 
 def _read_at_most(file: IO[bytes], most: int) -> bytes:
     """At most a number of bytes; memory is allocated for the actual content, not for the limit."""
-    pieces, remaining = [], most
-    while remaining and (piece := file.read(min(remaining, PIECE_BYTES))):
-        pieces.append(piece)
-        remaining -= len(piece)
-    return b"".join(pieces)
+    chunks, remaining = [], most
+    while remaining and (chunk := file.read(min(remaining, CHUNK_BYTES))):
+        chunks.append(chunk)
+        remaining -= len(chunk)
+    return b"".join(chunks)
 
 
 MOST_VALUES = 4_000_000

@@ -39,9 +39,9 @@ class WallClock:
     anchors: tuple[tuple[float, float], ...] = ()
 
     @classmethod
-    def read(cls, told: object) -> WallClock:
+    def read(cls, recorded: object) -> WallClock:
         """The clock of a recorded run; without anchors if there is no valid one."""
-        pairs = told if isinstance(told, list | tuple) else ()
+        pairs = recorded if isinstance(recorded, list | tuple) else ()
         anchors = tuple(
             (float(pair[0]), float(pair[1]))
             for pair in pairs[:MOST_ANCHORS]
@@ -81,8 +81,8 @@ class WallClock:
         known = self.seconds(time_s)
         if known is not None and abs(known - wall_s) <= TOLERANCE_S:
             return self
-        kept = [a for a in self.anchors if a[0] < time_s]
-        return WallClock((*kept, (time_s, wall_s))[-MOST_ANCHORS:])
+        earlier = [a for a in self.anchors if a[0] < time_s]
+        return WallClock((*earlier, (time_s, wall_s))[-MOST_ANCHORS:])
 
 
 def _is_time(value: object) -> bool:
@@ -95,8 +95,8 @@ def utc_text(seconds: float) -> str:
     >>> utc_text(1795455235.0181)
     '2026-11-23T17:33:55.018Z'
     """
-    whole = datetime.fromtimestamp(min(max(seconds, 0.0), LATEST), UTC)
-    return whole.strftime("%Y-%m-%dT%H:%M:%S.") + f"{whole.microsecond // 1000:03d}Z"
+    moment = datetime.fromtimestamp(min(max(seconds, 0.0), LATEST), UTC)
+    return moment.strftime("%Y-%m-%dT%H:%M:%S.") + f"{moment.microsecond // 1000:03d}Z"
 
 
 class RecordStamp:

@@ -24,8 +24,7 @@ class PredicateDefinition:
 
     Attributes:
         argument_kinds: Kinds of its arguments: 'object', 'relation', 'kind', 'name', 'zone', 'signal',
-            'word',
-            'allen' or 'tpcc' (relations of these calculi).
+            'word', 'allen' or 'tpcc' (relations of these calculi).
         evaluate: Its evaluation: codes of all objects, one dimension per argument 'object', in order; the
             other arguments are passed as words.
         meaning: Its meaning in one clause.

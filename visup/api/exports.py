@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import Any
 
 from visup.agent.model.errors import OutputError, SettingsError
-from visup.agent.storage.atomic import write_whole
+from visup.agent.storage.atomic import write_atomically
 from visup.api.recorded import RecordedObject, RecordedRun, open_run
 
 COLUMNS = (
@@ -55,7 +55,7 @@ def export(
     recorded = run if isinstance(run, RecordedRun) else open_run(run)
     text, count = FORMS[form](recorded)
     try:
-        write_whole(Path(target), text.encode("utf-8"))
+        write_atomically(Path(target), text.encode("utf-8"))
     except OSError as fault:
         what = f"the file cannot be written ({fault.strerror})"
         raise OutputError(what, where=str(target)) from fault

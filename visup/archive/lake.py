@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from visup.agent.model.errors import OutputError
-from visup.agent.storage.atomic import replacing, write_whole
+from visup.agent.storage.atomic import replacing, write_atomically
 from visup.agent.storage.journal import segments
 from visup.agent.storage.journal_reader import JOURNAL, Recording, opened_readonly
 from visup.archive.extra import imported
@@ -128,7 +128,7 @@ class Lake:
             for table in TABLES:
                 lake._write_table(lake._table_folder(table) / SCHEMA_FILE, table, [])
             mark = {"format": "visup lake", "version": SCHEMA_VERSION}
-            write_whole(path / MARK, (json.dumps(mark) + "\n").encode())
+            write_atomically(path / MARK, (json.dumps(mark) + "\n").encode())
         except OSError as fault:
             raise _unwritable(path, fault) from fault
         return lake
@@ -186,7 +186,7 @@ class Lake:
         try:
             self._save(self.folder_of(run), recording, inputs)
             if beliefs:
-                write_whole(self.folder_of(run) / BELIEFS, beliefs)
+                write_atomically(self.folder_of(run) / BELIEFS, beliefs)
             for table in sorted(TABLES, key=lambda name: name == "runs"):  # `runs` last: it commits
                 if tables[table]:
                     self._write_table(self.table_file(table, run), table, tables[table])
@@ -271,7 +271,7 @@ class Lake:
         folder.mkdir(parents=True, exist_ok=True)
         for name, content in inputs.files().items():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            write_whole(folder / name, content)
+            write_atomically(folder / name, content)
         for number, path in enumerate(segments(recording.path), 1):
             name = JOURNAL if number == 1 else f"{Path(JOURNAL).stem}-{number}.sqlite"
             with replacing(folder / name) as draft:

@@ -14,7 +14,7 @@ from typing import Any
 from visup.agent.cycle.agent import Agent
 from visup.agent.model.errors import OutputError
 from visup.agent.model.step import Step
-from visup.agent.storage.atomic import write_whole
+from visup.agent.storage.atomic import write_atomically
 from visup.agent.storage.checkpoint import StateError, dump_state, load_state
 from visup.agent.storage.seal import SealError, own_key, seal, unsealed
 from visup.agent.storage.text_file import read_bounded
@@ -132,7 +132,7 @@ class CheckpointWriter:
         packed = seal(PACKED + zlib.compress(data, 1), self._key)
         # On failure the older state stays; disk faults are reported for the journal.
         with suppress(OSError):
-            write_whole(self._path, packed)
+            write_atomically(self._path, packed)
         self.written += len(packed)
         self._size = float(len(packed))
         self._left -= len(packed)

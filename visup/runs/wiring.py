@@ -143,7 +143,9 @@ def build_agent(
         cast={**_cast(tasks), **actors},
         observers=observers,
         models=known,
-        limits=replace(_limits(settings, live), wakeful=always_active(contracts, _rules(settings))),
+        limits=replace(
+            _limits(settings, live), never_asleep=always_active(contracts, _rules(settings))
+        ),
     )
 
 
@@ -272,7 +274,7 @@ class VerdictMonitor:
 
 def _limits(settings: WatchSettings, live: bool) -> Limits:
     usual = Limits(budgets=settings.budgets, isolate=frozenset(settings.isolate))
-    return replace(usual, hang_s=LIVE_HANG_S, patient=False) if live else usual
+    return replace(usual, hang_s=LIVE_HANG_S, longer_hangs=False) if live else usual
 
 
 def _behaviours(

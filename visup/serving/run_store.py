@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from visup.agent.model.errors import OutputError
-from visup.agent.storage.atomic import write_whole
+from visup.agent.storage.atomic import write_atomically
 from visup.agent.storage.journal_reader import Recording
 from visup.agent.storage.text_file import read_text_file
 from visup.percepts.video import Ending
@@ -115,7 +115,7 @@ def note_run(run: Path, fingerprint: str) -> None:
     """
     note = json.dumps({"run": run.name, "fingerprint": fingerprint}, indent=1)
     try:
-        write_whole(run.parent / CURRENT, note.encode() + b"\n")
+        write_atomically(run.parent / CURRENT, note.encode() + b"\n")
     except OSError as fault:
         raise _unwritable(run.parent, fault) from fault
 

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from visup.agent.model.errors import OutputError
-from visup.agent.storage.disk_reserve import PageReserve, lengthen
+from visup.agent.storage.disk_reserve import PageReserve, preallocate
 from visup.sinks.lines import json_text
 
 SCHEMA = """
@@ -75,7 +75,7 @@ class DeliveryLog:
         )
         self._reserve.keep(self._db)
         with suppress(OSError):
-            lengthen(path.with_name(f"{path.name}-journal"), LOG_BYTES)
+            preallocate(path.with_name(f"{path.name}-journal"), LOG_BYTES)
 
     @property
     def told_frame(self) -> int:

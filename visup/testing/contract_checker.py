@@ -163,7 +163,7 @@ def _run_clip(
     outing, behaviour = _ClipRun(), make()
     own = behaviour.contract.name
     others = stub_behaviours(behaviour.contract.needs, shots, provide)
-    here = Limits(hang_s=None, here=True, wakeful=frozenset({own}))
+    here = Limits(hang_s=None, in_process=True, never_asleep=frozenset({own}))
     slots = ordered_slots([*others, behaviour], here)
     for shot in shots:
         image = shot.frame.image.copy()

@@ -35,24 +35,24 @@ from visup.agent.model.errors import BehaviourError
         ({"version": CONTRACT_VERSION + 1}, "written for another version of visup"),
     ],
 )
-def test_a_contract_that_makes_no_sense_is_refused_in_words(
+def test_an_invalid_contract_is_refused_with_a_message(
     fields: dict[str, Any], message: str
 ) -> None:
     with pytest.raises(BehaviourError, match=message):
         Contract(**{"name": "lamp", "gives": ("lamp",), **fields})
 
 
-def test_lists_of_kinds_will_do() -> None:
+def test_kinds_may_be_given_as_a_list() -> None:
     assert Contract("lamp", gives=["lamp"]).gives == ("lamp",)  # type: ignore[arg-type]
 
 
-def test_a_contract_makes_percepts_of_its_own() -> None:
+def test_a_contract_creates_percepts_of_its_behaviour() -> None:
     frame = next(frames(1))
     percept = Contract("eye", gives=("x", "y")).percept(frame, 3, kind="y", confidence=0.5)
     assert (percept.kind, percept.value, percept.time) == ("y", 3, frame.time)
     assert (percept.source, percept.confidence) == ("eye", 0.5)
 
 
-def test_what_needs_only_what_it_gives_itself_is_refused() -> None:
+def test_a_behaviour_that_needs_its_own_kind_is_refused() -> None:
     with pytest.raises(BehaviourError, match="which no behaviour but itself gives"):
         ordered_slots([Scripted("eye", ("x",), needs=("x",))])

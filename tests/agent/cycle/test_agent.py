@@ -22,14 +22,14 @@ def test_the_same_frames_give_the_same_steps() -> None:
     assert told(list(make().steps(frames(30)))) == told(list(make().steps(frames(30))))
 
 
-def test_two_agents_never_meet() -> None:
+def test_two_agents_share_no_state() -> None:
     a, b = make(), make()
     alone = told(list(make().steps(frames(20))))
     mixed = [(a.step(f), b.step(f)) for f in frames(20)]
     assert told([s for s, _ in mixed]) == told([s for _, s in mixed]) == alone
 
 
-def test_a_run_stops_at_its_condition_and_goes_on_from_there() -> None:
+def test_a_run_stops_at_its_condition_and_continues_from_there() -> None:
     agent, source = make(), frames(10)
     first = agent.run(source, until=lambda s: s.frame_index == 3)
     then = agent.run(source)
@@ -40,11 +40,11 @@ def test_a_run_stops_at_its_condition_and_goes_on_from_there() -> None:
     assert agent.mind.recall(COUNTING) == 10
 
 
-def test_a_run_over_nothing_gives_no_step() -> None:
+def test_a_run_over_no_frames_gives_no_step() -> None:
     assert make().run(frames(0)) is None
 
 
-def test_a_reasoner_that_raises_leaves_the_mind_as_it_was_and_an_alert() -> None:
+def test_a_reasoner_that_raises_leaves_the_mind_unchanged_and_opens_an_alert() -> None:
     reasoners = Reasoners(update=(counting, exploding_at(4)))
     agent = Agent([Scripted("eye", ("x",))], reasoners)
     steps = list(agent.steps(frames(8)))
@@ -57,7 +57,7 @@ def test_a_reasoner_that_raises_leaves_the_mind_as_it_was_and_an_alert() -> None
     assert after.mind.recall(COUNTING) == 5
 
 
-def test_an_open_alert_is_not_closed_by_a_step_that_could_not_think() -> None:
+def test_an_open_alert_stays_open_in_a_step_whose_reasoning_failed() -> None:
     always = worried_while(lambda _: True)
     blown = [exploding_at(i) for i in range(5, 40)]
     agent = Agent([], Reasoners(cogitate=(always, *blown)))
@@ -78,7 +78,7 @@ def test_directives_reach_behaviours_in_the_next_step() -> None:
     assert [[d.data["count"] for d in given] for given in eye.directives] == [[], [0], [1]]
 
 
-def test_a_failed_behaviour_is_an_alert() -> None:
+def test_a_failed_behaviour_opens_an_alert() -> None:
     def says(i: int) -> object:
         raise ValueError("broken")
 
@@ -89,7 +89,7 @@ def test_a_failed_behaviour_is_an_alert() -> None:
     ]
 
 
-def test_observers_see_every_step_and_the_mind_is_theirs_to_keep() -> None:
+def test_observers_receive_every_step_with_an_immutable_mind() -> None:
     kept: list[Mind] = []
     agent = make()
     agent.observers = (lambda step, frame: kept.append(step.mind),)

@@ -35,7 +35,7 @@ def exits(mind: Mind) -> Any:
 
 
 @pytest.mark.parametrize("what", [*NONSENSE, "exit"])
-def test_nonsense_of_a_reasoner_leaves_the_mind_as_it_was(what: str) -> None:
+def test_an_invalid_outcome_leaves_the_mind_unchanged(what: str) -> None:
     says = NONSENSE.get(what, exits)
 
     def think(mind: Mind, observation: Observation) -> Any:

@@ -16,7 +16,7 @@ from visup.agent import Contract, Directive, Frame, Observation, Report, ReportS
 from visup.agent.contract.contract import COMPILING_HANG_S
 from visup.agent.contract.limits import Limits
 from visup.agent.cycle.agent import Agent
-from visup.agent.execution.behaviour_slot import PATIENCE
+from visup.agent.execution.behaviour_slot import FAILURES_BEFORE_SUSPENSION
 from visup.agent.execution.pipeline import ordered_slots, perceive
 from visup.agent.model.errors import BehaviourError
 from visup.agent.model.step import Step
@@ -68,7 +68,7 @@ def unreadable() -> None:
 
 
 @pytest.mark.parametrize("does", [spin, lambda: time.sleep(0.6)])
-def test_a_hang_costs_its_limit_once_and_the_step_goes_on(does: Callable[[], Any]) -> None:
+def test_a_hang_costs_its_limit_once_and_the_step_continues(does: Callable[[], Any]) -> None:
     before = threading.active_count()
     begin = time.monotonic()
     told = reports(Plug(at(1, does)), Limits(hang_s=0.2), 40)
@@ -82,7 +82,7 @@ def test_a_hang_costs_its_limit_once_and_the_step_goes_on(does: Callable[[], Any
     assert threading.active_count() <= before  # what was given up ends, and so do idle threads
 
 
-def test_a_behaviour_that_comes_back_from_a_hang_runs_again() -> None:
+def test_a_behaviour_that_recovers_from_a_hang_runs_again() -> None:
     told = reports(Plug(at(1, spin)), Limits(hang_s=0.2), 40)
     assert told[-1].state is ReportState.RAN
     assert told[-1].percepts[0].value == 39
@@ -96,7 +96,9 @@ def test_a_behaviour_that_comes_back_from_a_hang_runs_again() -> None:
         (unreadable, "Unreadable: (its message cannot be read)"),
     ],
 )
-def test_a_plug_in_ends_itself_never_the_supervisor(does: Callable[[], Any], said: str) -> None:
+def test_an_exit_of_a_plug_in_does_not_end_the_supervisor(
+    does: Callable[[], Any], said: str
+) -> None:
     told = reports(Plug(at(1, does)), Limits(), 4)
     assert [r.state for r in told] == [ReportState.RAN, ReportState.FAILED] + [ReportState.RAN] * 2
     assert said in told[1].error
@@ -107,7 +109,7 @@ def test_an_exit_is_contained_in_the_thread_of_the_caller_too() -> None:
     assert [r.state.value for r in told] == ["ran", "failed", "ran", "ran"]
 
 
-def test_threads_change_nothing_in_what_is_perceived() -> None:
+def test_percepts_are_the_same_with_and_without_threads() -> None:
     def run(limits: Limits) -> list[Step]:
         behaviours = [Scripted("eye", ("x",)), Scripted("namer", ("y",), needs=("x",))]
         return list(Agent(behaviours, limits=limits).steps(frames(20)))
@@ -116,17 +118,17 @@ def test_threads_change_nothing_in_what_is_perceived() -> None:
     assert [s.reports for s in threaded] == [s.reports for s in direct]
 
 
-def test_without_budgets_no_decision_hangs_on_time() -> None:
+def test_without_budgets_no_decision_depends_on_time() -> None:
     ticks = iter(range(0, 10**6, 1000))  # a clock by which every run takes for ever
     limits = Limits(hang_s=None, clock=lambda: float(next(ticks)))
     told = reports(Plug(lambda f, s: f.index, cost_ms=1.0), limits, 10)
     assert {r.state for r in told} == {ReportState.RAN}
 
 
-def test_what_compiles_at_its_first_use_may_take_longer_but_not_live() -> None:
+def test_a_contract_may_extend_the_hang_limit_except_live() -> None:
     slow, usual = Contract("slow", ("x",), hang_s=600.0), Contract("usual", ("x",))
     assert MotionBehaviour.contract.hang_s == COMPILING_HANG_S
-    recorded, live = Limits(hang_s=60.0), Limits(hang_s=20.0, patient=False)
+    recorded, live = Limits(hang_s=60.0), Limits(hang_s=20.0, longer_hangs=False)
     assert [recorded.seconds(slow), recorded.seconds(usual)] == [600.0, 60.0]
     assert [live.seconds(slow), live.seconds(usual)] == [20.0, 20.0]
     assert Limits(hang_s=None).seconds(slow) is None
@@ -135,7 +137,7 @@ def test_what_compiles_at_its_first_use_may_take_longer_but_not_live() -> None:
         Contract("slow", ("x",), hang_s=-1.0)
 
 
-def test_over_budget_is_late_and_too_often_late_is_suspended() -> None:
+def test_a_run_over_budget_is_late_and_repeated_ones_suspend() -> None:
     now = [0.0]
 
     def slow(frame: Frame, observation: Observation) -> int:
@@ -144,13 +146,15 @@ def test_over_budget_is_late_and_too_often_late_is_suspended() -> None:
 
     limits = Limits(hang_s=None, budgets=True, clock=lambda: now[0])
     told = reports(Plug(slow, cost_ms=40.0), limits, 8)
-    assert [r.state for r in told[:PATIENCE]] == [ReportState.LATE] * PATIENCE
-    assert {r.state for r in told[PATIENCE:]} == {ReportState.SUSPENDED}
+    assert [r.state for r in told[:FAILURES_BEFORE_SUSPENSION]] == [
+        ReportState.LATE
+    ] * FAILURES_BEFORE_SUSPENSION
+    assert {r.state for r in told[FAILURES_BEFORE_SUSPENSION:]} == {ReportState.SUSPENDED}
     assert told[0].error == "it took longer than its budget of 40 ms"
     assert {r.state for r in reports(Plug(slow, cost_ms=60.0), limits, 8)} == {ReportState.RAN}
 
 
-def test_what_rests_after_a_failure_stays_unknown_until_it_has_run_again() -> None:
+def test_kinds_of_a_failed_behaviour_stay_unknown_until_it_has_run_again() -> None:
     def fails(frame: Frame, observation: Observation) -> int:
         if frame.index == 5:
             raise ValueError("no light")
@@ -162,7 +166,7 @@ def test_what_rests_after_a_failure_stays_unknown_until_it_has_run_again() -> No
     assert [s.reports[0].state for s in seen[:2]] == [ReportState.RAN, ReportState.RESTED]
 
 
-def test_who_is_blind_because_another_failed_leaves_its_kinds_unknown() -> None:
+def test_kinds_of_a_blind_behaviour_are_unknown() -> None:
     def fails(_: int) -> object:
         raise ValueError("no light")
 
@@ -174,7 +178,7 @@ def test_who_is_blind_because_another_failed_leaves_its_kinds_unknown() -> None:
     assert [r.state.value for r in seen.reports] == ["failed", "blind", "blind"]
 
 
-def test_one_of_two_who_look_for_a_kind_is_not_enough() -> None:
+def test_a_kind_is_unknown_if_one_of_its_two_providers_failed() -> None:
     def fails(_: int) -> object:
         raise ValueError("no light")
 
@@ -184,7 +188,7 @@ def test_one_of_two_who_look_for_a_kind_is_not_enough() -> None:
     assert not seen.observed("x")
 
 
-def test_memory_that_is_kept_is_noticed() -> None:
+def test_retained_memory_exceeds_the_limit() -> None:
     kept: list[Any] = []
 
     def hoard(frame: Frame, observation: Observation) -> int:
@@ -202,7 +206,7 @@ def test_memory_that_is_kept_is_noticed() -> None:
     assert told[first + 1].state is ReportState.SUSPENDED
 
 
-def test_memory_given_back_by_others_does_not_pay_for_what_is_kept() -> None:
+def test_memory_freed_by_others_does_not_offset_growth() -> None:
     others = [np.ones(200 * 2**20, np.uint8)]
     kept: list[Any] = []
 
@@ -228,7 +232,7 @@ def test_a_frame_cannot_be_written_to() -> None:
     assert [int(f.image[0, 0, 0]) for f in given] == [0, 1, 2]
 
 
-def test_the_past_is_as_long_as_asked_for_and_nobody_else_sees_it() -> None:
+def test_the_past_has_the_requested_length_and_is_private() -> None:
     def past(frame: Frame, observation: Observation) -> list[int]:
         assert all(p.observation.frame_index == p.frame.index for p in observation.past)
         return [p.frame.index for p in observation.past]
@@ -238,7 +242,7 @@ def test_the_past_is_as_long_as_asked_for_and_nobody_else_sees_it() -> None:
     assert all(s.observation.past == () for s in steps)
 
 
-def test_a_clock_that_is_set_back_keeps_nobody_waiting() -> None:
+def test_a_clock_set_back_delays_no_behaviour() -> None:
     image = np.zeros((4, 6, 3), np.uint8)
     slots = ordered_slots([Plug(lambda f, s: f.index, every_s=10.0)])
     times = [100.0, 101.0, 3.0]

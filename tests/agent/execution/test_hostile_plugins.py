@@ -15,7 +15,7 @@ from visup.agent import Report, ReportState
 from visup.agent.contract.limits import Limits
 from visup.agent.cycle.agent import Agent
 from visup.agent.execution.contracts import read_contracts
-from visup.agent.execution.sandbox import isolating
+from visup.agent.execution.sandbox import can_use_namespaces
 from visup.agent.model.errors import BehaviourError, SettingsError
 from visup.agent.plugins.isolated import IsolatedBehaviour
 
@@ -83,7 +83,7 @@ def reports(behaviour: IsolatedBehaviour, count: int = 2, limits: Limits = LIMIT
         ("import sys; print('last words', file=sys.stderr); import os; os._exit(3)", "last words"),
     ],
 )
-def test_a_file_that_ends_its_process_is_refused_in_words(
+def test_a_file_that_ends_its_process_is_refused_with_a_message(
     tmp_path: Path, top: str, said: str
 ) -> None:
     path = tmp_path / "plug.py"
@@ -92,7 +92,7 @@ def test_a_file_that_ends_its_process_is_refused_in_words(
         read_contracts(str(path))
 
 
-def test_contracts_and_refusals_are_those_that_an_import_would_give(tmp_path: Path) -> None:
+def test_contracts_and_errors_equal_those_of_an_import(tmp_path: Path) -> None:
     path = tmp_path / "lamp.py"
     path.write_text(
         "from pydantic import BaseModel, Field\n"
@@ -112,7 +112,7 @@ def test_contracts_and_refusals_are_those_that_an_import_would_give(tmp_path: Pa
         read_contracts(str(path), {"lamp": {"contrast": -1}})
 
 
-def test_its_file_is_not_imported_by_the_supervisor(tmp_path: Path) -> None:
+def test_the_file_of_a_plug_in_is_not_imported_by_the_supervisor(tmp_path: Path) -> None:
     mark = tmp_path / "pids"
     top = f"import os\nopen({str(mark)!r}, 'a').write(os.readlink('/proc/self') + '\\n')\n"
     told = reports(plug(tmp_path, "return 1", top))
@@ -120,7 +120,7 @@ def test_its_file_is_not_imported_by_the_supervisor(tmp_path: Path) -> None:
     assert str(os.getpid()) not in mark.read_text().split()
 
 
-def test_what_it_reports_is_data(tmp_path: Path) -> None:
+def test_reports_of_a_process_cannot_execute_code(tmp_path: Path) -> None:
     body = "return type('Evil', (), {'__reduce__': lambda self: (os.abort, ())})()"
     told = reports(plug(tmp_path, body))
     assert {r.state for r in told} == {ReportState.FAILED}
@@ -147,7 +147,7 @@ def test_what_it_reports_is_data(tmp_path: Path) -> None:
         ("return '\\ud800'", "cannot be sent"),
     ],
 )
-def test_nonsense_on_the_wire_is_its_failure_and_holds_nobody_up(
+def test_invalid_messages_are_a_failure_and_do_not_block(
     tmp_path: Path, body: str, said: str
 ) -> None:
     behaviour = plug(tmp_path, body)
@@ -159,19 +159,19 @@ def test_nonsense_on_the_wire_is_its_failure_and_holds_nobody_up(
 
 
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="no bounds of memory here")
-def test_memory_that_may_be_shared_is_bounded_too(tmp_path: Path) -> None:
+def test_shared_memory_is_limited_too(tmp_path: Path) -> None:
     taken = reports(plug(tmp_path, "import mmap\nmmap.mmap(-1, 2**40)\nreturn 1"), 1, PATIENT)
     assert taken[0].state is ReportState.FAILED
     assert "memory" in taken[0].error
 
 
 needs_namespaces = pytest.mark.skipif(
-    not isolating(), reason="processes cannot have namespaces of their own here"
+    not can_use_namespaces(), reason="processes cannot have namespaces of their own here"
 )
 
 
 @needs_namespaces
-def test_it_cannot_signal_the_supervisor(tmp_path: Path) -> None:
+def test_a_plug_in_cannot_signal_the_supervisor(tmp_path: Path) -> None:
     got: list[int] = []
     before = signal.signal(signal.SIGUSR1, lambda number, frame: got.append(number))
     try:
@@ -183,7 +183,7 @@ def test_it_cannot_signal_the_supervisor(tmp_path: Path) -> None:
 
 
 @needs_namespaces
-def test_it_cannot_look_into_the_memory_of_the_supervisor(tmp_path: Path) -> None:
+def test_a_plug_in_cannot_read_the_memory_of_the_supervisor(tmp_path: Path) -> None:
     told = reports(plug(tmp_path, "open(f'/proc/{supervisor()}/mem', 'r+b')\nreturn 1"))
     assert "PermissionError" in told[0].error
 
@@ -201,7 +201,7 @@ return [int(Path(p).name) for p in Path('/proc').glob('[0-9]*') if held(p)]
 
 
 @needs_namespaces
-def test_what_it_started_ends_with_it(tmp_path: Path) -> None:
+def test_children_of_a_plug_in_end_with_it(tmp_path: Path) -> None:
     # They are told by a file that only they hold open.
     mark = tmp_path / "held"
     top = (
@@ -222,6 +222,6 @@ def test_what_it_started_ends_with_it(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="the system does not count the processes of root")
-def test_it_cannot_fork_without_end(tmp_path: Path) -> None:
+def test_a_plug_in_cannot_fork_without_limit(tmp_path: Path) -> None:
     body = "for n in range(3000):\n    if os.fork() == 0:\n        time.sleep(60)\nreturn n"
     assert "BlockingIOError" in reports(plug(tmp_path, body), 1, PATIENT)[0].error

@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 
 from tests.agent.scripted import Scripted, frames
 from visup.agent import Percept, Region, ReportState
-from visup.agent.execution.behaviour_slot import FIRST_SUSPENSION_S, PATIENCE
+from visup.agent.execution.behaviour_slot import FAILURES_BEFORE_SUSPENSION, FIRST_SUSPENSION_S
 from visup.agent.execution.pipeline import ordered_slots, perceive
 from visup.agent.model.errors import BehaviourError
 
 
 @given(st.permutations(["a", "b", "c", "d"]))
-def test_whatever_the_given_order_needs_come_before_those_who_need_them(order: list[str]) -> None:
+def test_behaviours_run_after_the_providers_of_their_needs(order: list[str]) -> None:
     needs = {"a": (), "b": ("A",), "c": ("B",), "d": ("A", "C")}
     slots = ordered_slots([Scripted(n, (n.upper(),), needs=needs[n]) for n in order])
     placed = [s.behaviour.contract.name for s in slots]
@@ -34,14 +34,14 @@ def test_whatever_the_given_order_needs_come_before_those_who_need_them(order: l
         ),
     ],
 )
-def test_what_cannot_be_ordered_is_refused_in_words(
+def test_cyclic_or_unmet_needs_are_refused_with_a_message(
     behaviours: list[Scripted], message: str
 ) -> None:
     with pytest.raises(BehaviourError, match=message):
         ordered_slots(behaviours)
 
 
-def test_a_behaviour_that_raises_is_reported_and_its_kind_counts_as_unobserved() -> None:
+def test_a_behaviour_that_raises_is_reported_and_its_kind_is_unknown() -> None:
     def says(_: int) -> object:
         raise ValueError("no light")
 
@@ -54,7 +54,7 @@ def test_a_behaviour_that_raises_is_reported_and_its_kind_counts_as_unobserved()
     assert not seen.observed("y")
 
 
-def test_who_needs_what_was_not_observed_rests_instead_of_seeing_nothing() -> None:
+def test_a_behaviour_rests_if_its_needs_were_not_observed() -> None:
     def says(_: int) -> object:
         raise ValueError("no light")
 
@@ -80,7 +80,7 @@ def test_a_report_outside_the_contract_is_a_failure(report: Any, message: str) -
     assert not seen.reports[0].percepts
 
 
-def test_repeated_failures_suspend_and_a_success_forgives() -> None:
+def test_repeated_failures_suspend_and_a_success_resets_the_count() -> None:
     def says(i: int) -> object:
         if i < 20:
             raise ValueError("not yet")
@@ -88,14 +88,16 @@ def test_repeated_failures_suspend_and_a_success_forgives() -> None:
 
     slots = ordered_slots([Scripted("slow", ("x",), says)])
     states = [perceive(slots, f, ()).reports[0].state for f in frames(60)]
-    assert states[:PATIENCE] == [ReportState.FAILED] * PATIENCE
+    assert states[:FAILURES_BEFORE_SUSPENSION] == [ReportState.FAILED] * FAILURES_BEFORE_SUSPENSION
     rest = round(FIRST_SUSPENSION_S * 10)
-    assert states[PATIENCE : PATIENCE + rest - 1] == [ReportState.SUSPENDED] * (rest - 1)
+    assert states[FAILURES_BEFORE_SUSPENSION : FAILURES_BEFORE_SUSPENSION + rest - 1] == [
+        ReportState.SUSPENDED
+    ] * (rest - 1)
     assert states[-1] is ReportState.RAN
     assert slots[0].failures == 0
 
 
-def test_a_behaviour_runs_no_more_often_than_it_asks_for() -> None:
+def test_a_behaviour_runs_no_more_often_than_every_s() -> None:
     slots = ordered_slots([Scripted("lazy", ("x",), every_s=0.5)])
     ran = [
         f.index for f in frames(20) if perceive(slots, f, ()).reports[0].state is ReportState.RAN

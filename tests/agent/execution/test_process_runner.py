@@ -103,8 +103,8 @@ def counts(steps: list[Step]) -> list[Any]:
     return [v for s in steps for v in s.observation.of("count")]
 
 
-def test_another_process_perceives_what_this_one_would() -> None:
-    apart, here = watch(Alone(), 6), watch(Alone(), 6, Limits(here=True))
+def test_percepts_are_the_same_in_another_process() -> None:
+    apart, here = watch(Alone(), 6), watch(Alone(), 6, Limits(in_process=True))
     assert counts(apart) == counts(here)
     assert counts(here)[3] == [4, 3 * 6 * 4 * 3, [1, 2], [2]]
     assert {v for s in apart for v in s.observation.of("pid")}.isdisjoint({os.getpid()})
@@ -121,7 +121,7 @@ def test_another_process_perceives_what_this_one_would() -> None:
         ("hoard", ReportState.FAILED, "MemoryError"),
     ],
 )
-def test_what_breaks_a_process_is_told_and_a_new_one_goes_on(
+def test_a_broken_process_is_reported_and_replaced(
     does: str, state: ReportState, said: str
 ) -> None:
     steps = watch(Alone(does), 16)
@@ -137,7 +137,7 @@ def test_what_breaks_a_process_is_told_and_a_new_one_goes_on(
 @pytest.mark.parametrize(
     ("does", "said"), [("exit", "it called for an exit"), ("scribble", "read-only"), ("odd", "Odd")]
 )
-def test_what_only_fails_keeps_its_process(does: str, said: str) -> None:
+def test_an_exception_does_not_end_the_process(does: str, said: str) -> None:
     steps = watch(Alone(does), 5)
     assert said in steps[2].reports[0].error
     assert [c[0] for c in counts(steps)] == [1, 2, 4, 5]
@@ -190,12 +190,12 @@ def test_a_supervisor_that_is_killed_leaves_no_process(tmp_path: Path) -> None:
 
 
 def alive(pid: int) -> bool:
+    status = Path(f"/proc/{pid}/stat")
     try:
         os.kill(pid, 0)
-    except ProcessLookupError:
+        return not status.exists() or status.read_text().split()[2] != "Z"
+    except (ProcessLookupError, FileNotFoundError):  # it may end between the two
         return False
-    status = Path(f"/proc/{pid}/stat")
-    return not status.exists() or status.read_text().split()[2] != "Z"
 
 
 class Holding(Alone):
@@ -213,14 +213,14 @@ class Holding(Alone):
         self.held = (n for n in range(3))
 
 
-def test_what_cannot_be_sent_is_refused_with_the_way_out() -> None:
+def test_unsendable_attributes_are_refused_with_a_hint() -> None:
     with pytest.raises(BehaviourError, match="cannot be sent to a process") as caught:
         Agent([Holding("made")], limits=LIMITS)
     assert "`start`" in str(caught.value)
     assert counts(watch(Holding("started"), 2))[-1][0] == 2
 
 
-def test_a_start_that_fails_is_told() -> None:
+def test_a_failed_start_is_reported() -> None:
     told = [s.reports[0] for s in watch(Holding("never"), 2)]
     assert {r.state for r in told} == {ReportState.FAILED}
     assert told[0].error.endswith("it does not start: OSError: no device")
@@ -247,6 +247,6 @@ def test_a_name_that_is_not_there_cannot_be_isolated() -> None:
         Agent([Alone()], limits=Limits(isolate=frozenset({"nose"})))
 
 
-def test_it_works_where_processes_have_no_namespaces(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sandbox, "isolating", lambda: False)
+def test_isolation_works_without_namespaces(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sandbox, "can_use_namespaces", lambda: False)
     assert counts(watch(Alone(), 2))[-1][0] == 2

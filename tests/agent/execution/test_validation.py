@@ -49,7 +49,7 @@ def judge(value: object, kind: str = "own", **changes: Any) -> None:
         ((EYE.percept(FRAME, i, kind="own") for i in count()), "more than 5 percepts"),
     ],
 )
-def test_what_is_no_percepts_is_refused(said: object, message: str) -> None:
+def test_other_values_than_percepts_are_refused(said: object, message: str) -> None:
     with pytest.raises(BehaviourError, match=message):
         collect_percepts(EYE, said)
 
@@ -125,7 +125,7 @@ def test_a_region_with_a_wrong_field_is_refused(changes: dict[str, Any]) -> None
         ("health", HealthStatus.OK),
     ],
 )
-def test_a_value_that_is_not_what_its_kind_says_is_refused(kind: str, value: object) -> None:
+def test_a_value_of_a_wrong_type_for_its_kind_is_refused(kind: str, value: object) -> None:
     with pytest.raises(BehaviourError):
         judge(value, kind)
 
@@ -158,7 +158,7 @@ plain = st.recursive(
 
 
 @given(plain, st.sampled_from([NAN, INF, -INF, np.float32(NAN), np.array([1.0, NAN])]))
-def test_no_number_that_is_none_hides_in_a_value_of_an_own_kind(value: Any, bad: Any) -> None:
+def test_non_finite_numbers_in_nested_values_are_refused(value: Any, bad: Any) -> None:
     finite = "inf" not in repr(value)
     if finite:
         judge(value)
@@ -167,7 +167,7 @@ def test_no_number_that_is_none_hides_in_a_value_of_an_own_kind(value: Any, bad:
             judge(wrapped)
 
 
-def test_what_was_not_measured_can_be_masked() -> None:
+def test_masked_arrays_may_hold_missing_values() -> None:
     judge(np.ma.masked_invalid(np.array([[1.0, NAN]])))
     with pytest.raises(BehaviourError):
         judge(np.array([[1.0, NAN]]))
@@ -176,12 +176,12 @@ def test_what_was_not_measured_can_be_masked() -> None:
 
 
 @pytest.mark.parametrize("value", [int, len, (n for n in "ab"), object(), {"a": [lambda: 0]}])
-def test_what_is_no_data_is_refused(value: object) -> None:
+def test_values_that_are_not_data_are_refused(value: object) -> None:
     with pytest.raises(BehaviourError, match="expected: numbers, text, arrays"):
         judge(value)
 
 
-def test_a_value_within_itself_is_refused() -> None:
+def test_a_recursive_value_is_refused() -> None:
     endless: list[Any] = []
     endless.append(endless)
     with pytest.raises(BehaviourError, match="nested too deep"):
@@ -189,7 +189,7 @@ def test_a_value_within_itself_is_refused() -> None:
 
 
 @given(st.binary(max_size=8) | st.floats() | st.complex_numbers() | st.dates() | plain)
-def test_whatever_a_field_holds_it_is_accepted_or_refused_in_words(junk: Any) -> None:
+def test_any_field_value_is_accepted_or_refused_with_a_message(junk: Any) -> None:
     for field in ("id", "bbox", "centroid", "area", "confidence", "contour", "motion"):
         try:
             judge(replace(REGION, **{field: junk}), "region")
@@ -199,13 +199,13 @@ def test_whatever_a_field_holds_it_is_accepted_or_refused_in_words(junk: Any) ->
             assert isinstance(Percept("region", junk, 0.0, "eye"), Percept)
 
 
-def test_messages_are_short_whatever_is_reported() -> None:
+def test_messages_about_any_value_are_short() -> None:
     with pytest.raises(BehaviourError) as caught:
         judge(1, kind="x" * 10_000)
     assert len(str(caught.value)) < 300
 
 
-def test_a_frame_of_another_size_changes_what_is_inside() -> None:
+def test_regions_are_checked_against_the_size_of_their_frame() -> None:
     small = Frame(0, 0.0, np.zeros((4, 4, 3), np.uint8))
     with pytest.raises(BehaviourError, match="a box within"):
         check_percepts(EYE, [Percept("region", REGION, 0.0, "eye")], small)

@@ -13,7 +13,7 @@ WORDS = st.text("abcé_ ", max_size=9) | st.sampled_from(["", "converging", "div
 
 
 @given(WORDS, st.lists(WORDS, max_size=8), st.integers(1, 4), st.sampled_from([0.0, 0.4, 0.6, 1.0]))
-def test_what_is_close_is_what_the_standard_library_finds(
+def test_close_matches_equal_those_of_difflib(
     word: str, known: list[str], n: int, cutoff: float
 ) -> None:
     near = [w[:-1] for w in known] + [w + word for w in known]

@@ -50,7 +50,7 @@ KINDS = pytest.mark.parametrize("kind", [Record, Open])
 
 @KINDS
 @given(changes=st.fixed_dictionaries({}, optional=VALUES), one=st.integers())
-def test_a_changed_record_is_that_of_the_library(
+def test_replace_equals_dataclasses_replace(
     kind: type[Record], changes: dict[str, object], one: int
 ) -> None:
     record = kind(one)
@@ -59,14 +59,14 @@ def test_a_changed_record_is_that_of_the_library(
     assert all(getattr(record, f.name) == getattr(kind(one), f.name) for f in fields(record))
 
 
-def test_what_was_worked_out_from_old_fields_stays_behind() -> None:
+def test_cached_properties_are_not_copied() -> None:
     record = Open(1)
     assert record.double == 2
     assert changing.replace(record, one=5).double == 10
     assert changing.replace(record, two="c").double == 2
 
 
-def test_a_record_that_checks_its_fields_checks_them_again() -> None:
+def test_post_init_checks_run_again() -> None:
     with pytest.raises(ValueError):
         changing.replace(Checked(1), one=-1)
 
@@ -77,18 +77,18 @@ def test_a_changed_record_stays_frozen(kind: type[Record]) -> None:
         changing.replace(kind(1), one=2).one = 3  # type: ignore[misc]
 
 
-def test_a_record_of_a_single_field_is_changed_too() -> None:
+def test_a_record_with_a_single_field_is_changed() -> None:
     assert changing.replace(Single(1), one=2) == Single(2)
 
 
 @KINDS
-def test_a_field_that_is_not_there_is_refused(kind: type[Record]) -> None:
+def test_an_unknown_field_is_refused(kind: type[Record]) -> None:
     with pytest.raises(KeyError):
         changing.replace(kind(1), four=4)
 
 
 @KINDS
-def test_a_record_of_which_nothing_changes_stays_the_same_one(kind: type[Record]) -> None:
+def test_a_record_without_changes_is_returned_itself(kind: type[Record]) -> None:
     record = kind(1, "b", (3,))
     assert changing.replace(record, one=1, three=record.three) is record
     assert changing.replace(record, one=2) is not record

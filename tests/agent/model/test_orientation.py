@@ -33,7 +33,7 @@ def test_a_view_is_that_of_its_orientation(seed: int, angle: float) -> None:
 
 
 @given(seeds, angles)
-def test_orientations_are_proper_and_the_viewer_is_before_the_object(
+def test_orientations_are_proper_rotations_with_the_viewer_in_front(
     seed: int, angle: float
 ) -> None:
     direction = any_rotation(seed)[1]
@@ -52,7 +52,7 @@ def test_along_the_pole_y_is_up(pole: tuple[int, int, int]) -> None:
 
 
 @given(seeds)
-def test_the_picture_from_behind_has_right_and_left_exchanged(seed: int) -> None:
+def test_the_image_from_behind_is_mirrored(seed: int) -> None:
     direction = any_rotation(seed)[2]
     (right, up), (right_behind, up_behind) = image_axes(direction), image_axes(-direction)
     assert np.allclose(right, -right_behind)
@@ -60,7 +60,7 @@ def test_the_picture_from_behind_has_right_and_left_exchanged(seed: int) -> None
 
 
 @given(seeds, st.floats(0.0, 3.0), angles, angles)
-def test_swing_and_roll_are_those_by_which_an_orientation_was_turned(
+def test_swing_and_roll_recover_the_applied_rotation(
     seed: int, swing: float, about: float, roll: float
 ) -> None:
     before = any_rotation(seed)
@@ -71,7 +71,7 @@ def test_swing_and_roll_are_those_by_which_an_orientation_was_turned(
     assert found[1] == pytest.approx(roll, abs=1e-6)
 
 
-def test_many_are_worked_out_at_once_as_one_by_one() -> None:
+def test_batched_orientations_equal_single_ones() -> None:
     directions = Rotation.random(7, random_state=1).as_matrix()[:, 0]
     turns = np.linspace(-3, 3, 7)
     together = orientations(directions, turns)

@@ -8,9 +8,7 @@ from visup.agent import Coupling, Mind, Observation, Region, Relation, Report, R
 
 
 @given(st.integers(-6, 14), st.integers(-6, 14), st.integers(1, 4), st.integers(1, 4))
-def test_a_full_mask_holds_the_crop_in_its_place_and_nothing_else(
-    x: int, y: int, w: int, h: int
-) -> None:
+def test_a_full_mask_has_the_crop_at_its_position_only(x: int, y: int, w: int, h: int) -> None:
     crop = np.random.default_rng(abs(x + 7 * y)).random((h, w)) > 0.5
     region = Region(1, (x, y, w, h), crop, np.zeros((0, 2), np.float32), (0, 0), float(crop.sum()))
     full = region.full_mask((12, 10))
@@ -21,7 +19,7 @@ def test_a_full_mask_holds_the_crop_in_its_place_and_nothing_else(
     }
 
 
-def test_seeing_nothing_differs_from_not_looking() -> None:
+def test_observing_nothing_differs_from_not_observing() -> None:
     looked = Report("eye", ReportState.RAN, ("region",))
     rested = Report("eye", ReportState.RESTED, ("region",))
     assert Observation(0, 0.0, (1, 1), (looked,)).observed("region")

@@ -62,7 +62,7 @@ def test_order_counts_for_what_is_not_symmetric() -> None:
                 assert found.objects == objects
 
 
-def test_values_confidence_and_unknown_are_told() -> None:
+def test_relations_have_value_confidence_and_unknown() -> None:
     known, unknown = TABLE.find("closing", 2, 5), TABLE.find("closing", 5, 9)
     assert known == Relation("closing", (2, 5), Truth.TRUE, 3.0, 0.5, 7.0)
     assert unknown is not None
@@ -72,7 +72,7 @@ def test_values_confidence_and_unknown_are_told() -> None:
 @pytest.mark.parametrize(
     ("name", "objects"), [("closing", (2, 3)), ("no_such", (2, 5)), ("closing", (2,))]
 )
-def test_what_is_not_judged_is_none(name: str, objects: tuple[int, ...]) -> None:
+def test_relations_that_are_not_evaluated_are_none(name: str, objects: tuple[int, ...]) -> None:
     assert TABLE.find(name, *objects) is None
 
 

@@ -66,7 +66,7 @@ def test_settings_go_to_the_plug_ins_own_model(lamp: Path) -> None:
         ({"colours": ["red", 3]}, "lamp.colours.1", "3 is not valid"),
     ],
 )
-def test_a_setting_that_will_not_do_is_told_with_its_place(
+def test_an_invalid_setting_is_reported_with_its_place(
     lamp: Path, values: dict[str, object], where: str, message: str
 ) -> None:
     with pytest.raises(SettingsError) as caught:
@@ -75,13 +75,13 @@ def test_a_setting_that_will_not_do_is_told_with_its_place(
     assert message in str(caught.value)
 
 
-def test_all_that_is_wrong_with_settings_is_told_at_once(lamp: Path) -> None:
+def test_all_errors_of_settings_are_reported_together(lamp: Path) -> None:
     with pytest.raises(ErrorGroup) as caught:
         contrast(lamp, contrast=-1, colours=3)
     assert len(caught.value.errors) == 2
 
 
-def test_a_behaviour_without_settings_takes_none(tmp_path: Path) -> None:
+def test_a_behaviour_without_settings_refuses_any(tmp_path: Path) -> None:
     path = tmp_path / "plain.py"
     path.write_text(
         "from visup.agent import Contract\nclass A:\n    contract = Contract('a', ('x',))\n"
@@ -91,7 +91,7 @@ def test_a_behaviour_without_settings_takes_none(tmp_path: Path) -> None:
         load_behaviours(str(path), {"a": {"n": 1}})
 
 
-def test_a_module_path_will_do(lamp: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_behaviour_is_loaded_by_module_path(lamp: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     package = lamp.parent / "my_lamps"
     package.mkdir()
     (package / "__init__.py").touch()
@@ -131,7 +131,7 @@ def test_a_perceive_that_cannot_be_called_is_refused(
 @pytest.mark.parametrize(
     ("text", "line"), [("x = 1\ny = x +\n", 2), ("x = 1\n\nraise SystemExit\n", 3)]
 )
-def test_a_file_that_does_not_run_is_told_with_its_line(
+def test_a_file_that_does_not_run_is_reported_with_its_line(
     tmp_path: Path, text: str, line: int
 ) -> None:
     path = tmp_path / "broken.py"
@@ -141,14 +141,14 @@ def test_a_file_that_does_not_run_is_told_with_its_line(
     assert caught.value.where == f"{path}:{line}"
 
 
-def test_a_faulty_contract_in_a_file_is_told_as_such(tmp_path: Path) -> None:
+def test_an_invalid_contract_in_a_file_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "lamp.py"
     path.write_text("from visup.agent import Contract\nContract('lamp', gives=('lamp'))\n")
     with pytest.raises(BehaviourError, match="a tuple of one has a comma"):
         load_behaviours(str(path))
 
 
-def test_two_files_of_one_name_stay_apart(lamp: Path, tmp_path: Path) -> None:
+def test_two_files_of_the_same_name_are_different_modules(lamp: Path, tmp_path: Path) -> None:
     other = tmp_path / "other" / "lamp.py"
     other.parent.mkdir()
     other.write_text(LAMP.replace("100", "5"))
@@ -157,7 +157,7 @@ def test_two_files_of_one_name_stay_apart(lamp: Path, tmp_path: Path) -> None:
     assert sys.modules[type(first).__module__].__file__ == str(lamp)
 
 
-def test_a_class_of_another_module_is_none_of_the_file(lamp: Path) -> None:
+def test_imported_classes_are_not_behaviours_of_the_file(lamp: Path) -> None:
     lamp.write_text(lamp.read_text() + "\nfrom visup.percepts.health import HealthBehaviour\n")
     assert [o.contract.name for o in find_factories(str(lamp)) if o.contract] == ["lamp"]
 
@@ -180,13 +180,13 @@ def test_values_on_the_command_line_are_toml_or_text(text: str, value: object) -
 
 
 @pytest.mark.parametrize("text", ["lamp", "lamp=3", "lamp.=3", ".x=3", "lamp.x"])
-def test_what_is_no_setting_is_refused(text: str) -> None:
+def test_a_malformed_setting_is_refused(text: str) -> None:
     with pytest.raises(SettingsError, match="cannot be read"):
         parse_settings([text])
 
 
 @given(st.text(max_size=20))
-def test_whatever_is_set_is_read_or_refused_in_words(text: str) -> None:
+def test_any_setting_is_read_or_refused_with_a_message(text: str) -> None:
     try:
         values = parse_settings([text])
     except VisupError:
@@ -209,7 +209,7 @@ def test_one_setting_given_twice_is_refused() -> None:
         ("[behaviours]\nlamp = 3", "not a table of tables"),
     ],
 )
-def test_a_settings_file_that_will_not_do_is_refused(
+def test_an_invalid_settings_file_is_refused(
     tmp_path: Path, text: str | None, message: str
 ) -> None:
     path = tmp_path / "settings.toml"
@@ -220,7 +220,7 @@ def test_a_settings_file_that_will_not_do_is_refused(
     assert caught.value.where == str(path)
 
 
-def test_the_command_line_goes_over_the_file(tmp_path: Path) -> None:
+def test_the_command_line_overrides_the_file(tmp_path: Path) -> None:
     path = tmp_path / "settings.toml"
     path.write_text("[behaviours.lamp]\ncontrast = 3\ncolours = ['red']\n")
     values = merge_settings(read_settings(path), parse_settings(["lamp.contrast=4"]))

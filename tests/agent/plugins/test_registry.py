@@ -53,7 +53,7 @@ def test_a_behaviour_in_a_file_runs(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_a_file_that_is_no_plug_in_is_refused_in_words(
+def test_a_file_without_a_plug_in_is_refused_with_a_message(
     tmp_path: Path, text: str | None, message: str
 ) -> None:
     path = tmp_path / "plugin.py"

@@ -28,18 +28,18 @@ from visup.tasks.grammar.conditions import Name, PartName
 
 @settings(max_examples=40)
 @given(st.lists(regions(), max_size=2), plugin_values)
-def test_what_is_thawed_is_what_was_frozen(given_regions: list[Region], value: Any) -> None:
+def test_a_loaded_state_equals_the_saved_one(given_regions: list[Region], value: Any) -> None:
     assert same(load_state(dump_state([given_regions, value])), [given_regions, value])
 
 
-def test_one_object_stays_one() -> None:
+def test_shared_references_are_preserved() -> None:
     shared = [1, 2]
     a, b, c = load_state(dump_state((shared, shared, [1, 2])))
     assert a is b
     assert a is not c
 
 
-def test_containers_keep_their_kind_and_order_in_memory() -> None:
+def test_containers_and_arrays_preserve_type_and_memory_order() -> None:
     columns = np.asfortranarray(np.arange(6.0).reshape(2, 3))
     told = load_state(dump_state((deque([1, 2], 5), MappingProxyType({(1, 2): {3}}), columns)))
     assert (told[0], told[0].maxlen) == (deque([1, 2]), 5)
@@ -49,7 +49,7 @@ def test_containers_keep_their_kind_and_order_in_memory() -> None:
     assert (told[2] == columns).all()
 
 
-def test_names_of_tasks_are_kept_with_where_they_stand() -> None:
+def test_names_of_tasks_are_saved_with_their_positions() -> None:
     name = PartName("gripper", Name("arm", Span(1, 9, 1, 12)), Span(1, 1, 1, 12))
     told = load_state(dump_state([name]))[0]
     assert (told, type(told), told.machine, told.span) == (name, PartName, "arm", name.span)
@@ -62,12 +62,12 @@ class Elsewhere:
 
 
 @pytest.mark.parametrize("value", [print, Elsewhere(), lambda: 1, int, object(), np.array([{}])])
-def test_what_is_not_state_is_refused(value: object) -> None:
+def test_values_that_cannot_be_saved_are_refused(value: object) -> None:
     with pytest.raises(StateError):
         dump_state({"x": [value]})
 
 
-def test_what_holds_itself_is_refused() -> None:
+def test_recursive_objects_are_refused() -> None:
     loop: list[Any] = []
     loop.append(loop)
     with pytest.raises(StateError, match="holds itself"):
@@ -147,7 +147,7 @@ def made() -> Agent:
 
 @given(st.integers(1, 59))
 @settings(max_examples=15)
-def test_an_agent_that_takes_up_a_state_goes_on_like_the_one_that_gave_it(at: int) -> None:
+def test_an_agent_with_a_loaded_state_continues_identically(at: int) -> None:
     sequence = list(frames(60))
     first = made()
     first.run(sequence[:at])
@@ -159,7 +159,7 @@ def test_an_agent_that_takes_up_a_state_goes_on_like_the_one_that_gave_it(at: in
         assert (a.events, a.alerts) == (b.events, b.alerts)
 
 
-def test_without_all_behaviours_only_the_mind_is_kept() -> None:
+def test_only_the_mind_is_saved_if_a_behaviour_cannot_be() -> None:
     first = Agent([Scripted("eye", ("x",))], Reasoners(update=(counting,)))
     first.run(frames(5))
     second = Agent([Scripted("eye", ("x",))], Reasoners(update=(counting,)))

@@ -123,7 +123,7 @@ def same(a: Any, b: Any) -> bool:
 
 @settings(max_examples=60)
 @given(st.lists(regions(), max_size=3), st.lists(hypotheses, max_size=3))
-def test_regions_and_hypotheses_come_back_as_they_were(
+def test_regions_and_hypotheses_round_trip(
     given_regions: list[Region], given_hypotheses: list[Hypothesis]
 ) -> None:
     values = [("region", r) for r in given_regions] + [("hypothesis", h) for h in given_hypotheses]
@@ -133,7 +133,7 @@ def test_regions_and_hypotheses_come_back_as_they_were(
 
 @settings(max_examples=80)
 @given(plugin_values)
-def test_plain_values_of_plug_ins_come_back_as_they_were(value: Any) -> None:
+def test_plain_values_of_plug_ins_round_trip(value: Any) -> None:
     seen = seen_of(("own", value))
     assert same(unpack_observation(pack_observation(seen)), seen)
 
@@ -153,18 +153,18 @@ def test_plain_values_of_plug_ins_come_back_as_they_were(value: Any) -> None:
         {1, 2},
     ],
 )
-def test_records_and_arrays_come_back_as_they_were(value: Any) -> None:
+def test_records_and_arrays_round_trip(value: Any) -> None:
     assert same(decode(json.loads(json.dumps(encode(value)))), value)
 
 
-def test_a_mapping_that_cannot_be_written_to_stays_so() -> None:
+def test_a_read_only_mapping_round_trips() -> None:
     back = decode(encode(MappingProxyType({"a": 1})))
     assert isinstance(back, MappingProxyType)
     assert dict(back) == {"a": 1}
 
 
 @given(masks)
-def test_runs_say_what_a_mask_is(mask: np.ndarray[Any, np.dtype[np.bool_]]) -> None:
+def test_run_lengths_encode_masks(mask: np.ndarray[Any, np.dtype[np.bool_]]) -> None:
     """Against a loop over the pixels."""
     lengths, value = [0], False
     for pixel in mask.ravel():
@@ -200,7 +200,7 @@ starts = st.sampled_from([0, 5, -3, 2**24 - 3, 3 - 2**24])
     st.lists(st.sampled_from([*MOVES, *MOVES, (0, 0), (2, 0)]), max_size=6),
     st.none() | st.tuples(st.integers(0, 6), st.integers(0, 1), odd_values),
 )
-def test_chains_say_what_a_contour_is(
+def test_chain_codes_encode_contours(
     start: tuple[int, int], moves: list[tuple[int, int]], odd: tuple[int, int, float] | None
 ) -> None:
     """Against a loop over the points."""
@@ -223,7 +223,7 @@ class Strange:
     pass
 
 
-def test_a_value_that_is_not_plain_leaves_what_its_behaviour_gives_unobserved() -> None:
+def test_kinds_of_a_value_that_cannot_be_encoded_are_unobserved() -> None:
     back = unpack_observation(pack_observation(seen_of(("own", Strange()), ("other", 1))))
     assert back.reports[0].state is ReportState.RESTED
     assert "Strange" in back.reports[0].error
@@ -243,7 +243,7 @@ REGION = Region(
 
 @settings(max_examples=150)
 @given(st.data())
-def test_damaged_bytes_are_refused_or_read_never_more(data: st.DataObject) -> None:
+def test_damaged_bytes_raise_no_other_errors(data: st.DataObject) -> None:
     good = pack_observation(seen_of(("region", REGION), ("own", {"a": (1, b"x")})))
     at = data.draw(st.integers(0, len(good) - 1))
     bad = good[:at] + data.draw(st.binary(max_size=3)) + good[at + 1 :]
@@ -263,7 +263,7 @@ json_values = st.recursive(
 
 @settings(max_examples=200)
 @given(json_values, st.sampled_from(["time", "frame_index", "frame_size", "reports", "value"]))
-def test_documents_of_another_form_are_refused_or_read_never_more(value: Any, place: str) -> None:
+def test_invalid_documents_raise_no_other_errors(value: Any, place: str) -> None:
     told = {"frame_index": 1, "time": 0.5, "frame_size": [4, 4], "reports": []}
     if place == "value":
         percept = ["own", value, 0.5, "eye", 1.0]
@@ -274,7 +274,7 @@ def test_documents_of_another_form_are_refused_or_read_never_more(value: Any, pl
         assert isinstance(unpack_observation(zlib.compress(json.dumps(told).encode())), Observation)
 
 
-def test_a_bomb_does_not_fill_the_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_decompression_bomb_does_not_fill_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("visup.agent.storage.codec.LARGEST_STEP_BYTES", 10**5)
     with pytest.raises(OutputError, match="too large"):
         unpack_observation(zlib.compress(b" " * 10**7))
@@ -289,7 +289,9 @@ def test_the_schema_in_the_docs_is_that_of_the_code() -> None:
 
 @settings(max_examples=30)
 @given(st.lists(regions(), max_size=2), hypotheses, plugin_values)
-def test_every_document_keeps_the_schema(found: list[Region], one: Hypothesis, own: Any) -> None:
+def test_every_document_conforms_to_the_schema(
+    found: list[Region], one: Hypothesis, own: Any
+) -> None:
     from visup.agent.storage.codec import to_document
     from visup.agent.storage.schema import StepDocument
 

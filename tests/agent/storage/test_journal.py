@@ -67,7 +67,7 @@ def test_exported_events_are_one_object_a_line_and_equal_runs_give_equal_bytes(
     assert all(set(json.loads(line)) == keys for line in a.splitlines())
 
 
-def test_a_killed_run_keeps_every_step_that_was_taken(tmp_path: Path) -> None:
+def test_a_killed_run_retains_every_recorded_step(tmp_path: Path) -> None:
     path = tmp_path / "journal.sqlite"
     root = ROOT
     done = subprocess.run(
@@ -84,18 +84,18 @@ def test_a_killed_run_keeps_every_step_that_was_taken(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("place", ["missing/journal.sqlite", "."])
-def test_a_journal_that_cannot_be_written_says_so(tmp_path: Path, place: str) -> None:
+def test_an_unwritable_journal_is_an_error(tmp_path: Path, place: str) -> None:
     with pytest.raises(OutputError, match="cannot be written"):
         Journal(tmp_path / place)
 
 
-def test_reading_something_else_says_so(tmp_path: Path) -> None:
+def test_reading_another_file_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "x.sqlite").write_text("not a database, but long enough to look like a file")
     with pytest.raises(OutputError, match="not a journal"):
         list(Recording.open(tmp_path / "x.sqlite").events())
 
 
-def test_a_step_that_cannot_be_written_leaves_the_earlier_ones(tmp_path: Path) -> None:
+def test_a_failed_write_leaves_earlier_steps_intact(tmp_path: Path) -> None:
     path = tmp_path / "journal.sqlite"
     journal = Journal(path)
     agent = Agent([], Reasoners(update=(counting,)), observers=(journal.record,))

@@ -61,7 +61,7 @@ def test_segments_are_cut_by_time_too(tmp_path: Path) -> None:
     assert len(segments(tmp_path / "journal.sqlite")) == 5
 
 
-def test_the_oldest_steps_go_when_more_is_kept_than_wanted_but_no_event(tmp_path: Path) -> None:
+def test_the_oldest_steps_are_dropped_beyond_keep_bytes_but_no_events(tmp_path: Path) -> None:
     path = tmp_path / "journal.sqlite"
     noise = np.random.default_rng(0)
     journal = Journal(path, JournalLimits(segment_bytes=200_000, keep_bytes=600_000))
@@ -80,7 +80,7 @@ def test_the_oldest_steps_go_when_more_is_kept_than_wanted_but_no_event(tmp_path
 
 
 @pytest.mark.parametrize("at", [0, 1, 17, 60])
-def test_a_journal_goes_on_where_it_was_left(tmp_path: Path, at: int) -> None:
+def test_a_resumed_journal_continues_where_it_ended(tmp_path: Path, at: int) -> None:
     """Against one written in one go; ids of events and alerts too."""
     sequence = list(frames(80))
     whole, parts = tmp_path / "whole.sqlite", tmp_path / "parts.sqlite"
@@ -103,7 +103,7 @@ def test_a_journal_goes_on_where_it_was_left(tmp_path: Path, at: int) -> None:
     ]
 
 
-def test_a_segment_that_was_just_begun_when_the_run_was_killed_is_begun_anew(
+def test_an_empty_segment_of_a_killed_run_is_restarted(
     tmp_path: Path,
 ) -> None:
     path = tmp_path / "journal.sqlite"
@@ -129,7 +129,7 @@ def test_a_journal_of_another_version_is_refused(tmp_path: Path, version: int) -
         Journal(path, resume=True)
 
 
-def test_another_database_is_no_journal(tmp_path: Path) -> None:
+def test_another_database_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "x.sqlite"
     db = sqlite3.connect(path)
     db.execute("CREATE TABLE run (key, value)")
@@ -140,7 +140,7 @@ def test_another_database_is_no_journal(tmp_path: Path) -> None:
         Recording.open(tmp_path)
 
 
-def test_a_folder_that_cannot_be_written_can_be_read(tmp_path: Path) -> None:
+def test_a_journal_in_a_read_only_folder_can_be_read(tmp_path: Path) -> None:
     write(tmp_path / "journal.sqlite", 5)
     tmp_path.chmod(0o500)
     try:
@@ -149,7 +149,7 @@ def test_a_folder_that_cannot_be_written_can_be_read(tmp_path: Path) -> None:
         tmp_path.chmod(0o700)
 
 
-def test_damaged_journals_give_one_message_and_what_came_before(tmp_path: Path) -> None:
+def test_a_damaged_journal_gives_one_message_and_the_steps_before(tmp_path: Path) -> None:
     """Bytes changed, runs of zeros, ends cut off: never anything but an OutputError."""
     good = tmp_path / "good.sqlite"
     seen = write(good, 60)
@@ -185,7 +185,7 @@ def test_damaged_journals_give_one_message_and_what_came_before(tmp_path: Path) 
     assert refused > 30
 
 
-def test_a_damaged_step_is_told_with_its_frame_and_those_before_it_are_given(
+def test_a_damaged_step_is_reported_with_its_frame_after_those_before_it(
     tmp_path: Path,
 ) -> None:
     path = tmp_path / "journal.sqlite"
@@ -201,7 +201,7 @@ def test_a_damaged_step_is_told_with_its_frame_and_those_before_it_are_given(
     assert [next(steps).frame_index for _ in range(6)] == list(range(6))
 
 
-def test_a_copy_made_while_the_run_goes_on_can_be_read(tmp_path: Path) -> None:
+def test_a_copy_of_a_live_journal_can_be_read(tmp_path: Path) -> None:
     path = tmp_path / "journal.sqlite"
     journal = Journal(path)
     agent(journal.record).run(frames(20))
@@ -213,7 +213,7 @@ def test_a_copy_made_while_the_run_goes_on_can_be_read(tmp_path: Path) -> None:
     journal.close()
 
 
-def test_without_room_steps_are_recorded_in_a_reserve_that_is_given_back(tmp_path: Path) -> None:
+def test_on_a_full_disk_steps_use_the_reserve_which_is_released(tmp_path: Path) -> None:
     """Also by who goes on with a run that was killed."""
     path = tmp_path / "journal.sqlite"
     reserve = JournalLimits(reserve_bytes=2**21)

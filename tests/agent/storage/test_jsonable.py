@@ -20,19 +20,19 @@ values = st.recursive(
 
 
 @given(values)
-def test_whatever_goes_in_strict_json_comes_out(value: object) -> None:
+def test_any_value_becomes_strict_json(value: object) -> None:
     json.dumps(to_jsonable(value), allow_nan=False)
 
 
-def test_numbers_are_rounded_and_the_odd_ones_told_in_words() -> None:
+def test_numbers_are_rounded_and_non_finite_ones_become_words() -> None:
     assert to_jsonable((0.1 + 0.2, math.inf, np.float32(2.0), np.int8(3))) == [0.3, "inf", 2.0, 3]
 
 
-def test_enums_are_told_by_word() -> None:
+def test_enums_are_written_as_words() -> None:
     assert to_jsonable((Severity.WARNING, Truth.UNKNOWN)) == ["warning", "unknown"]
 
 
-def test_masks_and_memories_are_left_out() -> None:
+def test_masks_and_memories_are_omitted() -> None:
     region = Region(1, (0, 0, 2, 2), np.ones((2, 2), bool), np.zeros((4, 2), np.float32), (1, 1), 4)
     assert "mask" not in to_jsonable(region)
     assert "memory" not in to_jsonable(Mind())

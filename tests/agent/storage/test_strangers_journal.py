@@ -119,7 +119,7 @@ CHANGES: dict[str, Change] = {
 
 
 @pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
-def test_what_no_behaviour_could_report_is_refused(run: Path, change: Change) -> None:
+def test_percepts_that_no_behaviour_could_report_are_refused(run: Path, change: Change) -> None:
     change_seen(run, 2, change)
     given: list[object] = []
     with pytest.raises(OutputError):
@@ -127,7 +127,7 @@ def test_what_no_behaviour_could_report_is_refused(run: Path, change: Change) ->
     assert len(given) <= 2
 
 
-def test_eighty_million_empty_lists_take_no_memory(run: Path) -> None:
+def test_eighty_million_empty_lists_are_refused_without_using_memory(run: Path) -> None:
     text = b'{"frame_index":2,"time":0,"frame_size":[6,4],"reports":[' + b"[]," * 10**7 + b"[]]}"
     with pytest.raises(OutputError, match="values"):
         unpack_observation(zlib.compress(text, 1))
@@ -138,7 +138,7 @@ def test_eighty_million_empty_lists_take_no_memory(run: Path) -> None:
     [10**400_000, "\ud800", {"\ud800": 1}, [[]] * 4_100_000],
     ids=["long number", "half a character", "as a key", "many lists"],
 )
-def test_what_could_not_be_read_back_is_not_written(value: object) -> None:
+def test_values_that_could_not_be_read_back_are_not_written(value: object) -> None:
     (step,) = Agent([Scripted("eye", ("x",))]).steps(frames(1))
     seen = step.observation
     (report,) = seen.reports
@@ -153,7 +153,7 @@ def test_what_could_not_be_read_back_is_not_written(value: object) -> None:
     assert back.reports[1].percepts == (good,)
 
 
-def test_arrays_keep_what_was_not_measured() -> None:
+def test_masked_arrays_round_trip() -> None:
     (step,) = Agent([Scripted("eye", ("x",))]).steps(frames(1))
     from dataclasses import replace
 
@@ -172,7 +172,7 @@ def test_arrays_keep_what_was_not_measured() -> None:
     ["1" * 5000, "[" * 10**5, '"' + "x" * (17 * 2**20) + '"', "[]"],
     ids=["number", "deep", "long", "list"],
 )
-def test_records_that_are_none_are_refused(run: Path, text: str) -> None:
+def test_invalid_records_are_refused(run: Path, text: str) -> None:
     db = sqlite3.connect(run / JOURNAL)
     db.execute("UPDATE steps SET summary = ?", (text,))
     db.commit()
@@ -181,12 +181,12 @@ def test_records_that_are_none_are_refused(run: Path, text: str) -> None:
         list(Recording.open(run).summaries())
 
 
-def test_a_journal_that_is_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
+def test_a_pipe_in_place_of_a_journal_does_not_block(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / JOURNAL)
     with pytest.raises(OutputError):
         Recording.open(tmp_path)
 
 
-def test_a_further_segment_that_is_a_pipe_is_none(run: Path) -> None:
+def test_a_pipe_in_place_of_a_segment_is_ignored(run: Path) -> None:
     os.mkfifo(run / "journal-2.sqlite")
     assert Recording.open(run).count() == 4

@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from visup.agent.storage.text_file import PIECE_BYTES, read_bounded
+from visup.agent.storage.text_file import CHUNK_BYTES, read_bounded
 
 
-@given(size=st.integers(0, 3 * PIECE_BYTES), most=st.integers(0, 3 * PIECE_BYTES))
-def test_a_file_is_read_whole_or_refused(
+@given(size=st.integers(0, 3 * CHUNK_BYTES), most=st.integers(0, 3 * CHUNK_BYTES))
+def test_a_file_is_read_completely_or_refused(
     tmp_path_factory: pytest.TempPathFactory, size: int, most: int
 ) -> None:
     path = tmp_path_factory.getbasetemp() / "some file"
@@ -38,13 +38,13 @@ def peak_memory(read: Callable[[], object]) -> int:
         tracemalloc.stop()
 
 
-def test_memory_is_taken_for_what_is_there(tmp_path: Path) -> None:
+def test_memory_is_allocated_for_the_actual_content(tmp_path: Path) -> None:
     path = tmp_path / "small"
     path.write_bytes(b"small")
-    assert peak_memory(lambda: read_bounded(path, 2**32)) < 4 * PIECE_BYTES
+    assert peak_memory(lambda: read_bounded(path, 2**32)) < 4 * CHUNK_BYTES
 
 
-def test_what_is_too_large_is_refused_before_it_is_read(tmp_path: Path) -> None:
+def test_a_too_large_file_is_refused_before_it_is_read(tmp_path: Path) -> None:
     path = tmp_path / "large"
     with path.open("wb") as file:
         file.truncate(2**33)  # takes no room on the disk
@@ -53,10 +53,10 @@ def test_what_is_too_large_is_refused_before_it_is_read(tmp_path: Path) -> None:
         with pytest.raises(OSError, match="larger than 1024 MB"):
             read_bounded(path, 2**30)
 
-    assert peak_memory(refused) < 4 * PIECE_BYTES
+    assert peak_memory(refused) < 4 * CHUNK_BYTES
 
 
-def test_a_pipe_is_no_file(tmp_path: Path) -> None:
+def test_a_pipe_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "pipe"
     os.mkfifo(path)
     with pytest.raises(OSError, match="not a file"):

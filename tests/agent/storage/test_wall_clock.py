@@ -16,7 +16,7 @@ STEPS = st.lists(st.tuples(st.floats(0.01, 100.0), st.floats(-50.0, 50.0)), max_
 
 
 @given(STEPS)
-def test_the_clock_is_never_further_off_than_it_may_be(steps: list[tuple[float, float]]) -> None:
+def test_the_clock_is_accurate_within_its_tolerance(steps: list[tuple[float, float]]) -> None:
     """Whoever asks at once is told the time as it was, however often the wall's clock is set."""
     clock, time, offset = WallClock(), 0.0, NOW
     for later, jump in steps:
@@ -39,7 +39,7 @@ def test_one_anchor_is_enough_while_the_clocks_agree(steps: list[float], off: fl
 
 
 @given(st.floats(0.0, 4e9))
-def test_a_time_is_told_in_utc_with_its_zone(seconds: float) -> None:
+def test_times_are_written_in_utc_with_their_zone(seconds: float) -> None:
     text = utc_text(seconds)
     assert text.endswith("Z")
     read = datetime.fromisoformat(text.replace("Z", "+00:00"))
@@ -48,7 +48,7 @@ def test_a_time_is_told_in_utc_with_its_zone(seconds: float) -> None:
 
 
 @given(st.floats(0.0, 4e9), st.floats(0.0, 4e9))
-def test_times_sort_as_texts(a: float, b: float) -> None:
+def test_times_sort_as_text(a: float, b: float) -> None:
     assert (utc_text(a) <= utc_text(b)) or a > b
 
 
@@ -59,11 +59,11 @@ def test_times_sort_as_texts(a: float, b: float) -> None:
         *([[1.0, 5.0], [0.0, 6.0]], [[0.0, 1e300]], [[0.0, float("nan")]]),
     ],
 )
-def test_a_clock_that_makes_no_sense_tells_nothing(told: object) -> None:
+def test_an_invalid_clock_gives_no_times(told: object) -> None:
     assert WallClock.read(told).text(3.0) is None
 
 
-def test_a_stamp_says_who_and_when() -> None:
+def test_a_stamp_has_camera_host_and_time() -> None:
     stamp = RecordStamp("cell", WallClock(((0.0, NOW),)), now=lambda: NOW + 60.0)
     told = stamp.of(1.5)
     assert told["camera"] == "cell"

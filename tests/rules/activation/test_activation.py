@@ -59,7 +59,7 @@ def run(*lenses: Lens, wakeful: frozenset[str] = frozenset()) -> list[Step]:
     rules = default_reasoners()
     wake = ActivationReasoner(activation_rules([b.contract for b in lenses]))
     reasoners = Reasoners(rules.update, rules.cogitate, attend=(wake,))
-    limits = Limits(hang_s=None, wakeful=wakeful)
+    limits = Limits(hang_s=None, never_asleep=wakeful)
     return list(Agent([Eye(), *lenses], reasoners, limits=limits).steps(s.frame for s in CLIP))
 
 
@@ -165,7 +165,7 @@ def test_what_safety_rules_read_is_given_by_someone_who_never_sleeps() -> None:
         == frozenset()
     )
     agent = build_agent(WatchSettings("clip"), also=[Lens(awake=NEAR)])
-    assert agent.limits.wakeful == frozenset()
+    assert agent.limits.never_asleep == frozenset()
 
 
 KINDS = st.sets(st.sampled_from(["region", "health", "hypothesis", "depth", "own"]), min_size=1)

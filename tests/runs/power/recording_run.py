@@ -8,7 +8,7 @@ from pathlib import Path
 from tests.agent.scripted import Scripted, counting, frames
 from visup.agent import Mind, Observation, Outcome
 from visup.agent.cycle.agent import Agent, Reasoners
-from visup.agent.storage.atomic import write_whole
+from visup.agent.storage.atomic import write_atomically
 from visup.agent.storage.journal import Journal, JournalLimits
 from visup.agent.storage.journal_reader import JOURNAL
 
@@ -30,7 +30,7 @@ def main(folder: Path, told: Path, count: int) -> None:
                 out.write(f"{event.frame_index}\n")
                 out.flush()
             if step.frame_index % 20 == 19:
-                write_whole(folder / "state.bin", f"{step.frame_index}\n".encode() * 5000)
+                write_atomically(folder / "state.bin", f"{step.frame_index}\n".encode() * 5000)
                 out.write(f"state {step.frame_index}\n")
                 out.flush()
     journal.close()

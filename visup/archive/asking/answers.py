@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from visup.agent.model.errors import OutputError, SettingsError
-from visup.agent.storage.atomic import replacing, write_whole
+from visup.agent.storage.atomic import replacing, write_atomically
 from visup.archive.extra import imported
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ def write_answer(table: pa.Table, form: str, out: Path) -> None:
     """
     try:
         if form in TEXTS:
-            write_whole(out, TEXTS[form](table).encode())
+            write_atomically(out, TEXTS[form](table).encode())
             return
         with replacing(out) as draft:
             imported("pyarrow.parquet").write_table(table, draft)

@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from visup.agent.storage.atomic import write_whole
+from visup.agent.storage.atomic import write_atomically
 from visup.agent.storage.file_lock import acquire_lock
 from visup.archive.filling.attempts import forget_interrupted
 from visup.archive.filling.pieces import CHUNKS
@@ -92,7 +92,7 @@ def fill(
     finally:
         with suppress(OSError):  # used for estimates only
             known = json.dumps({"bytes": rate[0], "seconds": rate[1]})
-            write_whole(lake.path / RATE, known.encode())
+            write_atomically(lake.path / RATE, known.encode())
     return result
 
 

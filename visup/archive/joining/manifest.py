@@ -14,7 +14,7 @@ from functools import cached_property, lru_cache
 from pathlib import Path
 
 from visup.agent.model.errors import OutputError
-from visup.agent.storage.atomic import write_whole
+from visup.agent.storage.atomic import write_atomically
 
 MANIFEST = "joined.json"
 FOLDER = "joined"
@@ -81,7 +81,7 @@ class Manifest:
             "partitions": [asdict(part) for part in self.partitions],
             "retired": dict(self.retired),
         }
-        write_whole(lake / MANIFEST, (json.dumps(fields) + "\n").encode())
+        write_atomically(lake / MANIFEST, (json.dumps(fields) + "\n").encode())
 
 
 def partition_name(runs: Iterable[str]) -> str:

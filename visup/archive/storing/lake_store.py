@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from visup.agent.model.errors import OutputError
-from visup.agent.storage.atomic import replacing, write_whole
+from visup.agent.storage.atomic import replacing, write_atomically
 from visup.archive.extra import imported
 from visup.archive.joining.manifest import FOLDER, MANIFEST, read_manifest
 from visup.archive.lake import MARK, RECORDINGS, SCHEMA_FILE, TABLES_FOLDER, Lake
@@ -59,11 +59,11 @@ class LakeStore:
             for name in sorted(tables, key=_commits_last):
                 _download(store, f"{root}/{name}", copy / name, remote[name])
             joined = _content(store, f"{root}/{MANIFEST}") if MANIFEST in remote else b""
-            write_whole(copy / PULLED, joined)
+            write_atomically(copy / PULLED, joined)
             if joined:
-                write_whole(copy / MANIFEST, joined)
+                write_atomically(copy / MANIFEST, joined)
             if MARK in remote:
-                write_whole(copy / MARK, _content(store, f"{root}/{MARK}"))
+                write_atomically(copy / MARK, _content(store, f"{root}/{MARK}"))
 
     def fetch(self, run: str, folder: Path) -> None:
         """Download the journal of a run and the files saved with it.
@@ -130,7 +130,7 @@ class LakeStore:
             )
         if remote != local_manifest:
             _upload(store, f"{root}/{MANIFEST}", local_manifest)
-            write_whole(lake.path / PULLED, local_manifest)
+            write_atomically(lake.path / PULLED, local_manifest)
         manifest = read_manifest(lake.path)
         parts = {p.name for p in manifest.partitions} | set(manifest.retired)
         obsolete = [

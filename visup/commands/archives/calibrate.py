@@ -63,7 +63,7 @@ def calibrate(
 def _fitted(lake: Lake, known: Mapping[str, RunTruth], path: Path) -> str:
     """Fit the weight of identity votes and write it; returns a sentence about the result."""
     from visup.agent.model.errors import OutputError
-    from visup.agent.storage.atomic import write_whole
+    from visup.agent.storage.atomic import write_atomically
     from visup.evaluation.archive.vote_fitting import FEWEST, fitted_evidence, labelled_votes
     from visup.rules.identity import VoteSettings
     from visup.runs.inputs.settings_file import fitted_settings
@@ -77,7 +77,7 @@ def _fitted(lake: Lake, known: Mapping[str, RunTruth], path: Path) -> str:
         f" the default is {VoteSettings().evidence:g}."
     )
     try:
-        write_whole(path, fitted_settings(evidence, how).encode())
+        write_atomically(path, fitted_settings(evidence, how).encode())
     except OSError as fault:
         said = fault.strerror or str(fault)
         raise OutputError(f"the settings cannot be written ({said})", where=str(path)) from fault

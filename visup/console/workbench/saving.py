@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from visup.agent.model.errors import OutputError, SettingsError
-from visup.agent.storage.atomic import write_whole
+from visup.agent.storage.atomic import write_atomically
 from visup.console.workbench.drafts import DraftKind, check_draft
 
 ENDINGS = {DraftKind.TASK: ".task", DraftKind.RULES: ".rules", DraftKind.ZONES: ".toml"}
@@ -45,7 +45,7 @@ def save_draft(folder: Path, kind: DraftKind, name: str, text: str, *, replace: 
             f"there is a file {path.name} already", hint="choose another name, or tick 'replace'"
         )
     try:
-        write_whole(path, text.encode() if text.endswith("\n") else f"{text}\n".encode())
+        write_atomically(path, text.encode() if text.endswith("\n") else f"{text}\n".encode())
     except (OSError, UnicodeEncodeError) as fault:
         reason = getattr(fault, "strerror", None) or fault
         raise OutputError(f"it cannot be saved: {reason}", where=path.name) from fault

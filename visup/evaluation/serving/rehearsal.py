@@ -22,7 +22,7 @@ import urllib3
 from urllib3.exceptions import HTTPError
 
 from visup.agent.model.errors import SettingsError
-from visup.agent.storage.atomic import write_whole
+from visup.agent.storage.atomic import write_atomically
 from visup.evaluation.figures import Progress, silent, sums_of
 from visup.evaluation.serving.account import Ledger
 from visup.evaluation.serving.costs import camera_costs
@@ -251,7 +251,7 @@ class Rehearsal:
     def _keep(self, told: dict[str, Any]) -> dict[str, Any]:
         """Save the figures so far, so that hours of work are not lost by a later fault."""
         if self._so_far:
-            write_whole(self._so_far, json.dumps(told, indent=1).encode())
+            write_atomically(self._so_far, json.dumps(told, indent=1).encode())
         return told
 
     def _look_into_journals(self) -> None:

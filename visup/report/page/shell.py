@@ -11,7 +11,7 @@ from pathlib import Path
 from string import Template
 
 from visup.agent.model.errors import ExtraMissingError, OutputError
-from visup.agent.storage.atomic import write_whole
+from visup.agent.storage.atomic import write_atomically
 from visup.report.page.figures import Figure
 
 SAID = {
@@ -66,7 +66,7 @@ def write_page(page: str, path: Path) -> None:
         OutputError: The file cannot be written.
     """
     try:
-        write_whole(path, page.encode())
+        write_atomically(path, page.encode())
     except OSError as fault:
         raise OutputError(
             f"the report cannot be written ({fault.strerror or fault})",

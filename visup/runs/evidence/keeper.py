@@ -21,7 +21,7 @@ from visup.agent import Alert, AlertCondition, Frame, Severity
 from visup.agent.cycle.system_alerts import NOT_RECORDED
 from visup.agent.execution.runners import error_line
 from visup.agent.model.step import Step
-from visup.agent.storage.atomic import write_whole
+from visup.agent.storage.atomic import write_atomically
 from visup.agent.storage.jsonable import to_jsonable
 from visup.agent.storage.text_file import read_text_file
 from visup.agent.storage.wall_clock import RecordStamp
@@ -154,13 +154,15 @@ class EvidenceKeeper:
         first = f"alert-{opened[0].id}"
         self._folder.mkdir(exist_ok=True)
         picture = jpeg_of(annotate(frame.image, step.mind), SNAPSHOT_QUALITY)
-        write_whole(self._folder / f"{first}.jpg", picture)
+        write_atomically(self._folder / f"{first}.jpg", picture)
         self._clip_for(first, seen)
         assert self._clip
         names = {"snapshot": f"{first}.jpg", "clip": f"{self._clip.path.stem}.webm"}
         for alert in opened:
             told = {**to_jsonable(alert), **self._stamp.of(alert.opened), **names}
-            write_whole(self._folder / f"alert-{alert.id}.json", json.dumps(told).encode() + b"\n")
+            write_atomically(
+                self._folder / f"alert-{alert.id}.json", json.dumps(told).encode() + b"\n"
+            )
             self._links[alert.id] = {key: self._link(name) for key, name in names.items()}
         self._fault = ""
 

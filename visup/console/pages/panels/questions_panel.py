@@ -11,7 +11,7 @@ from functools import partial
 from nicegui import ui
 
 from visup.agent import Question
-from visup.agent.cycle.answers import NOBODY
+from visup.agent.cycle.answers import NONE_OF_THE_MODELS
 from visup.agent.model.errors import VisupError
 from visup.console.access import ConsoleRole
 from visup.console.pages.frame import part_heading, shown_text, worded_button
@@ -63,8 +63,8 @@ class QuestionsPart:
     def _row(self, what: str, question: Question, act: Callable[[int, str], object]) -> None:
         with ui.row().classes("gap-1 items-center under-line"):
             ui.label(what).classes("dim")
-            for name in (*question.names, NOBODY[0]):
-                shown = name.replace("_", " ") if name != NOBODY[0] else "none of them"
+            for name in (*question.names, NONE_OF_THE_MODELS[0]):
+                shown = name.replace("_", " ") if name != NONE_OF_THE_MODELS[0] else "none of them"
                 worded_button(shown_text(shown), partial(act, question.object_id, name))
 
     def _say(self, object_id: int, name: str) -> None:
