@@ -154,7 +154,7 @@ class Journal:
         try:
             with suppress(
                 sqlite3.Error
-            ):  # what cannot be given back now stays free for what follows
+            ):  # pages that cannot be released now stay free for later use
                 self._db.executescript("PRAGMA incremental_vacuum")
             self._db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
             self._db.close()
@@ -223,10 +223,8 @@ class Journal:
         if self._segment_begin is None:
             return False
         limits = self._limits
-        return (
-            self._sizes[-1] >= limits.segment_bytes
-            or time - self._segment_begin >= limits.segment_s
-        )
+        duration = time - self._segment_begin
+        return self._sizes[-1] >= limits.segment_bytes or duration >= limits.segment_s
 
     def _next_segment(self) -> None:
         number = len(self._sizes) + 1
