@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from visup.percepts.detections.box_filter import BoxState, corrected, initial_state, predicted
-from visup.percepts.detections.boxes import Detection, overlap
+from visup.percepts.detections.boxes import Detection, intersection_over_union
 
 HIGH_SCORE = 0.5
 """Boxes of at least this score are associated first, the others with the remaining tracks (ByteTrack)."""
@@ -124,20 +124,22 @@ class MultiBoxTracker:
         for boxes, candidates, least in rounds:
             rows, places = sorted(free & candidates), [p for p in boxes if p not in owner]
             for i, p in _best_assignment(
-                rows, places, lambda i, p: self._overlap(i, ahead[i], found[p]), least
+                rows, places, lambda i, p: self._same_class_iou(i, ahead[i], found[p]), least
             ):
                 owner[p] = self._tracks[i]
-                self._update(owner[p], ahead[i], frame, found[p])
+                self._correct(owner[p], ahead[i], frame, found[p])
                 free.discard(i)
         return owner
 
     def _is_fresh(self, i: int, frame: int) -> bool:
         return frame - self._tracks[i].frame <= LOW_SCORE_FRAMES
 
-    def _overlap(self, i: int, predicted: BoxState, d: Detection) -> float:
-        return overlap(predicted.box, d.box) if d.name == self._tracks[i].name else 0.0
+    def _same_class_iou(self, i: int, predicted: BoxState, d: Detection) -> float:
+        return (
+            intersection_over_union(predicted.box, d.box) if d.name == self._tracks[i].name else 0.0
+        )
 
-    def _update(self, track: _BoxTrack, predicted: BoxState, frame: int, d: Detection) -> None:
+    def _correct(self, track: _BoxTrack, predicted: BoxState, frame: int, d: Detection) -> None:
         track.state, track.frame = corrected(predicted, d.box), frame
         track.odds += HIT_LOG_ODDS + _log_odds(d.score)
 

@@ -25,10 +25,10 @@ class Detection:
     name: str | None = None
 
 
-def overlap(a: Box, b: Box) -> float:
+def intersection_over_union(a: Box, b: Box) -> float:
     """Intersection over union, 0 to 1.
 
-    >>> overlap((0, 0, 10, 10), (5, 0, 10, 10)) == 50 / 150
+    >>> intersection_over_union((0, 0, 10, 10), (5, 0, 10, 10)) == 50 / 150
     True
     """
     width = min(a[0] + a[2], b[0] + b[2]) - max(a[0], b[0])

@@ -72,7 +72,13 @@ from visup.percepts.motion.output.region_report import (
 from visup.percepts.motion.output.segmentation_trace import SegmentationTrace
 from visup.percepts.motion.static_camera.static_segmenter import StaticCameraSegmenter
 from visup.percepts.motion.tracks.id_allocator import IdAllocator
-from visup.percepts.motion.tracks.lifecycle import ConfirmContext, confirm, delete, initiate, update
+from visup.percepts.motion.tracks.lifecycle import (
+    ConfirmContext,
+    confirm,
+    delete,
+    initiate,
+    update_tracks,
+)
 from visup.percepts.motion.tracks.measurements import (
     BaselineMotion,
     FrameMeasurements,
@@ -286,7 +292,7 @@ class MotionSegmenter:
     ) -> Tracks:
         """The tracks updated from the labels; parts merged, occluded ones split, lost ones deleted."""
         winner = labelling.winner
-        tracks = update(tracks, scene, labelling, evidence.likelihood, self.settings)
+        tracks = update_tracks(tracks, scene, labelling, evidence.likelihood, self.settings)
         tracks = update_salience(tracks, scene, winner)
         tracks = assign_unknown(tracks, scene, winner, self.settings, self._last_key)
         self._note_keys(tracks)

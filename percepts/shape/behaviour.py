@@ -22,7 +22,7 @@ from visup.percepts.shape.database.model_database import ModelDatabase, ViewMatc
 from visup.percepts.shape.refinement.pose_refiner import PoseRefiner, SizedHypothesis
 from visup.percepts.shape.silhouette.silhouette import Silhouette, normalise
 
-_THUMB = 48
+_THUMBNAIL_SIDE = 48
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,7 @@ class _MatchedRegion:
     """A region's silhouette when it was last matched, and the result; when its surface was last followed."""
 
     time: float
-    thumb: NDArray[np.bool_]
+    thumbnail: NDArray[np.bool_]
     aspect: float
     cut: bool
     restrict: frozenset[str] | None
@@ -86,16 +86,16 @@ class ShapeBehaviour:
     ) -> None:
         self.database = database
         self.settings = settings or ShapeSettings()
-        self._remembered: dict[int, _MatchedRegion] = {}
+        self._last_matches: dict[int, _MatchedRegion] = {}
         self._refiner = PoseRefiner(database.meshes if database is not None else {})
 
     def save(self) -> Mapping[str, Any]:
         """The state after the frames so far; see `visup.agent.storage.checkpoint`."""
-        return {"remembered": self._remembered, "fits": self._refiner.memory}
+        return {"remembered": self._last_matches, "fits": self._refiner.memory}
 
     def load(self, state: Mapping[str, Any]) -> None:
         """Restore the state of a behaviour with the same settings."""
-        self._remembered = dict(state["remembered"])
+        self._last_matches = dict(state["remembered"])
         self._refiner.memory = dict(state["fits"])
 
     def perceive(
@@ -113,35 +113,37 @@ class ShapeBehaviour:
         if self.database is None:
             return []
         regions: tuple[Region, ...] = observation.of("region")
-        restrict, first = _name_directives(directives)
-        here = {r.id for r in regions}
-        self._remembered = {k: v for k, v in self._remembered.items() if k in here}
+        restrict, try_first = _name_directives(directives)
+        visible_ids = {r.id for r in regions}
+        self._last_matches = {k: v for k, v in self._last_matches.items() if k in visible_ids}
         due = self._due(
             regions, frame.time, restrict, _rest_intervals(directives, self.contract.name)
         )
-        self._refiner.forget(here)
-        found = self._match(self.database, due, frame, restrict, first)
+        self._refiner.forget(visible_ids)
+        found = self._match(self.database, due, frame, restrict, try_first)
         for region, silhouette, matches in zip(due, *found, strict=True):
             hypotheses = self._refined(self.database, frame, region, silhouette, matches)
-            self._remembered[region.id] = _remembered(region, frame.time, restrict, hypotheses)
+            self._last_matches[region.id] = _matched_region(
+                region, frame.time, restrict, hypotheses
+            )
         self._follow(frame, regions)
         return [
             Percept("hypothesis", h, frame.time, self.contract.name, h.similarity)
             for r in regions
-            if r.id in self._remembered
-            for h in self._remembered[r.id].rescaled(r)
+            if r.id in self._last_matches
+            for h in self._last_matches[r.id].rescaled(r)
         ]
 
     def _follow(self, frame: Frame, regions: Sequence[Region]) -> None:
         """Renew orientations from the motion of surfaces where silhouettes are not matched again."""
         for region in regions:
-            old = self._remembered.get(region.id)
+            old = self._last_matches.get(region.id)
             if old is None or frame.time - old.followed < self.settings.every_s - 1e-6:
                 continue
             known = tuple(zip(old.hypotheses, old.areas, strict=True))
             found = self._refiner.followed(frame, region, known) or known
             hypotheses, areas = tuple(h for h, _ in found), tuple(area for _, area in found)
-            self._remembered[region.id] = replace(
+            self._last_matches[region.id] = replace(
                 old, followed=frame.time, hypotheses=hypotheses, areas=areas
             )
 
@@ -150,22 +152,24 @@ class ShapeBehaviour:
         regions: Sequence[Region],
         time: float,
         restrict: frozenset[str] | None,
-        resting: Mapping[int, float],
+        least_intervals: Mapping[int, float],
     ) -> list[Region]:
         """Regions to match now: those never matched first, then those matched longest ago."""
-        due = [r for r in regions if self._is_due(r, time, restrict, resting.get(r.id, 0.0))]
-        last = {k: v.time for k, v in self._remembered.items()}
+        due = [
+            r for r in regions if self._is_due(r, time, restrict, least_intervals.get(r.id, 0.0))
+        ]
+        last = {k: v.time for k, v in self._last_matches.items()}
         due.sort(key=lambda r: (last.get(r.id, -np.inf), r.id))
         return due[: self.settings.matches_per_frame]
 
     def _is_due(
-        self, region: Region, time: float, restrict: frozenset[str] | None, rests_s: float
+        self, region: Region, time: float, restrict: frozenset[str] | None, least_interval_s: float
     ) -> bool:
-        old = self._remembered.get(region.id)
+        old = self._last_matches.get(region.id)
         if old is None or old.restrict != restrict or time < old.time:
             return True
         since = time - old.time
-        if since < max(self.settings.every_s, rests_s) - 1e-6:
+        if since < max(self.settings.every_s, least_interval_s) - 1e-6:
             return False
         return since >= self.settings.renew_s or not self._unchanged(old, region)
 
@@ -176,9 +180,9 @@ class ShapeBehaviour:
             or not self.settings.unchanged < stretch < 1 / self.settings.unchanged
         ):
             return False
-        thumb = _thumb(region)
-        either = np.count_nonzero(thumb | old.thumb)
-        return bool(np.count_nonzero(thumb & old.thumb) >= self.settings.unchanged * either)
+        thumbnail = _thumbnail(region)
+        union = np.count_nonzero(thumbnail | old.thumbnail)
+        return bool(np.count_nonzero(thumbnail & old.thumbnail) >= self.settings.unchanged * union)
 
     def _match(
         self,
@@ -186,7 +190,7 @@ class ShapeBehaviour:
         regions: Sequence[Region],
         frame: Frame,
         restrict: frozenset[str] | None,
-        first: Collection[str],
+        try_first: Collection[str],
     ) -> tuple[list[Silhouette | None], list[tuple[ViewMatch, ...]]]:
         """Silhouettes of the regions and their matches; None and no matches without a shape."""
         silhouettes = [normalise(r.mask, cut=r.cut, sides=_border_sides(r, frame)) for r in regions]
@@ -198,7 +202,7 @@ class ShapeBehaviour:
                 per_name=self.settings.per_name,
                 threshold=self.settings.threshold,
                 restrict=restrict,
-                try_first=first,
+                try_first=try_first,
                 budget=self.settings.budget,
             )
         )
@@ -217,16 +221,16 @@ class ShapeBehaviour:
         if silhouette is None or not self._refiner.meshes:
             return tuple(hypotheses)
 
-        def more(name: str) -> list[SizedHypothesis]:
+        def further_views(name: str) -> list[SizedHypothesis]:
             # A view may be stored in two forms, of which one start is made.
             wanted = 2 * self._refiner.settings.starts
             found = database.query(silhouette, top=wanted, restrict={name})
             return [(_hypothesis(region, m), m.view.area) for m in found.matches]
 
-        return self._refiner.refined(frame, region, hypotheses, more)
+        return self._refiner.refined(frame, region, hypotheses, further_views)
 
 
-def _remembered(
+def _matched_region(
     region: Region,
     time: float,
     restrict: frozenset[str] | None,
@@ -234,7 +238,7 @@ def _remembered(
 ) -> _MatchedRegion:
     return _MatchedRegion(
         time=time,
-        thumb=_thumb(region),
+        thumbnail=_thumbnail(region),
         aspect=_aspect(region),
         cut=region.cut,
         restrict=restrict,
@@ -248,18 +252,20 @@ def _border_sides(region: Region, frame: Frame) -> tuple[str, ...]:
     """Sides of a region's box that lie on the image border."""
     x, y, w, h = region.bbox
     height, width = frame.image.shape[:2]
-    lies = {"right": x + w >= width, "bottom": y + h >= height, "left": x <= 0, "top": y <= 0}
-    return tuple(side for side, on in lies.items() if on)
+    touches = {"right": x + w >= width, "bottom": y + h >= height, "left": x <= 0, "top": y <= 0}
+    return tuple(side for side, touching in touches.items() if touching)
 
 
 def _aspect(region: Region) -> float:
     return region.bbox[2] / region.bbox[3]
 
 
-def _thumb(region: Region) -> NDArray[np.bool_]:
+def _thumbnail(region: Region) -> NDArray[np.bool_]:
     """The region's mask resized to a small square."""
     small = cv2.resize(
-        region.mask.astype(np.uint8) * np.uint8(255), (_THUMB, _THUMB), interpolation=cv2.INTER_AREA
+        region.mask.astype(np.uint8) * np.uint8(255),
+        (_THUMBNAIL_SIDE, _THUMBNAIL_SIDE),
+        interpolation=cv2.INTER_AREA,
     )
     return np.asarray(small > 127)
 
@@ -278,9 +284,9 @@ def _name_directives(
 ) -> tuple[frozenset[str] | None, frozenset[str]]:
     """The names to consider exclusively (None for all), and the names to try first."""
     restrict = [frozenset(d.data.get("names", ())) for d in directives if d.kind == "restrict"]
-    first = [frozenset(d.data.get("names", ())) for d in directives if d.kind == "try_first"]
-    only = frozenset().union(*restrict) if restrict else None
-    return only, frozenset().union(*first)
+    try_first = [frozenset(d.data.get("names", ())) for d in directives if d.kind == "try_first"]
+    allowed = frozenset().union(*restrict) if restrict else None
+    return allowed, frozenset().union(*try_first)
 
 
 def _hypothesis(region: Region, match: ViewMatch) -> Hypothesis:

@@ -95,7 +95,7 @@ def least_cost_repairs(
         changes = list(_in_order(last))
         choices = product(*(c.texts or ("",) for c in changes))
         for texts in islice(choices, SPELLINGS_TRIED) if changes else ():
-            yield _joined(text, words, changes, texts)
+            yield _as_one_repair(text, words, changes, texts)
 
 
 class _Search:
@@ -197,7 +197,9 @@ def _in_order(last: _Change | None) -> Iterator[_Change]:
         yield last
 
 
-def _joined(text: str, words: list[Word], changes: list[_Change], texts: tuple[str, ...]) -> Repair:
+def _as_one_repair(
+    text: str, words: list[Word], changes: list[_Change], texts: tuple[str, ...]
+) -> Repair:
     """All edits combined into one, over the part of the text that contains them."""
     first, last = changes[0].at, changes[-1].at + changes[-1].words
     parts: list[str] = []

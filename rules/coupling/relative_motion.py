@@ -26,7 +26,7 @@ from visup.rules.coupling._relative_motion_jit import first_recent, fused_veloci
 from visup.rules.geometry._outlines_jit import near_outline, register, run_boxes
 from visup.rules.geometry.outlines import TEMPLATE_POINTS, prepared_outline
 from visup.rules.geometry.regions import Floats
-from visup.rules.geometry.rings import even_rings, joined
+from visup.rules.geometry.rings import concatenated, even_rings
 
 Vector = tuple[float, float]
 
@@ -113,8 +113,8 @@ def outline_template(
         beside: The other body of the pair; if `region` is larger than that, only its part nearby is used.
     """
     parts = even_rings(prepared_outline(region).rings, TEMPLATE_POINTS)
-    points = joined(parts)
-    tangent = joined([np.roll(p, -1, axis=0) - np.roll(p, 1, axis=0) for p in parts])
+    points = concatenated(parts)
+    tangent = concatenated([np.roll(p, -1, axis=0) - np.roll(p, 1, axis=0) for p in parts])
     length = np.linalg.norm(tangent, axis=1)
     normals = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1) / np.maximum(length, 1e-9)[:, None]
     x, y = points.T

@@ -25,7 +25,7 @@ from visup.rules.geometry.regions import (
     box_gap,
     masks_overlap,
 )
-from visup.rules.geometry.rings import closed_rings, even_rings, joined, rings
+from visup.rules.geometry.rings import closed_rings, concatenated, even_rings, rings
 
 NEAR_SHARE = 0.05
 """Greatest gap that is computed exactly, image diagonals."""
@@ -57,7 +57,7 @@ class PreparedOutline:
     def __init__(self, region: Region) -> None:
         self._region = region
         self.rings = rings(region)
-        self.points = joined(self.rings)
+        self.points = concatenated(self.rings)
 
     @cached_property
     def boxes(self) -> Floats:
@@ -77,7 +77,7 @@ class PreparedOutline:
     @cached_property
     def even(self) -> Floats:
         """(M, 2) the outline resampled evenly, to at least `TEMPLATE_POINTS`."""
-        return joined(even_rings(self.rings, max(TEMPLATE_POINTS, len(self.points))))
+        return concatenated(even_rings(self.rings, max(TEMPLATE_POINTS, len(self.points))))
 
     @cached_property
     def even_boxes(self) -> Floats:

@@ -54,7 +54,7 @@ def _pixels(ring: cv2.typing.MatLike) -> float:
 
 def closed_rings(parts: Sequence[Floats], step: float) -> Floats:
     """(M, 2) points of rings, neighbours at most `step` pixels apart."""
-    return joined([p if longest_edge(p) <= step else densified(p, step) for p in parts])
+    return concatenated([p if longest_edge(p) <= step else densified(p, step) for p in parts])
 
 
 def even_rings(parts: Sequence[Floats], count: int) -> list[Floats]:
@@ -65,6 +65,6 @@ def even_rings(parts: Sequence[Floats], count: int) -> list[Floats]:
     return [resampled(p, max(1, round(count * len(p) / total))) for p in parts]
 
 
-def joined(parts: Sequence[Floats]) -> Floats:
+def concatenated(parts: Sequence[Floats]) -> Floats:
     """(M, 2) points of all rings."""
     return parts[0] if len(parts) == 1 else np.concatenate(parts)

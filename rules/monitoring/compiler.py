@@ -172,7 +172,7 @@ class Compiler:
                 return self.combined("not", self.formula(part, scope))
             case And(parts=parts) | Or(parts=parts):
                 join = "least" if isinstance(node, And) else "most"
-                return self._joined(join, [self.formula(p, scope) for p in parts])
+                return self._combined_all(join, [self.formula(p, scope) for p in parts])
             case PastOperator(kind=kind, part=part, window=window):
                 return self._past(kind, window, self.formula(part, scope))
             case Previous(part=part):
@@ -216,7 +216,7 @@ class Compiler:
                 return self.combined("power", self.term(base, scope), self.term(exponent, scope))
             case PointwiseFunction(name=name, parts=parts):
                 join = "least" if name == "min" else "most"
-                return self._joined(join, [self.term(p, scope) for p in parts])
+                return self._combined_all(join, [self.term(p, scope) for p in parts])
             case Variable(part=part, at=at):
                 assert part is not None
                 noted = self.term(part, scope), self.formula(at, scope)
@@ -235,7 +235,7 @@ class Compiler:
         step = self.program.add((kind, numbers, reads), Operation(kind, reads, axes, numbers))
         return ValueRef(step, at[0].delay, axes, all(p.certain for p in at))
 
-    def _joined(self, join: str, parts: list[ValueRef]) -> ValueRef:
+    def _combined_all(self, join: str, parts: list[ValueRef]) -> ValueRef:
         together = self.together(parts)
         at = together[0]
         for part in together[1:]:

@@ -118,7 +118,7 @@ class EarlyCompiler:
                 return EarlyValue(self._on.combined("not", early.first), last, early.steady)
             case And(parts=parts) | Or(parts=parts):
                 kind = "least" if isinstance(node, And) else "most"
-                return self._joined(kind, [self.formula(p, scope) for p in parts], last)
+                return self._combined_all(kind, [self.formula(p, scope) for p in parts], last)
             case Quantified(part=part):
                 early = self.formula(part, inner_scope(node, scope))
                 return replace(
@@ -155,7 +155,7 @@ class EarlyCompiler:
         """The early value of a part if it is valid up to the next sample, else unknown."""
         return early.first if early.steady else replace(self._unknown, delay=early.first.delay)
 
-    def _joined(self, kind: str, parts: list[EarlyValue], last: ValueRef) -> EarlyValue:
+    def _combined_all(self, kind: str, parts: list[EarlyValue], last: ValueRef) -> EarlyValue:
         first = max(p.first.delay for p in parts)
         alike = len({(p.first.delay, p.last.delay) for p in parts}) == 1
         # A delayed value is also read between samples.

@@ -33,7 +33,7 @@ class ActiveCondition:
     evidence_time: float
 
 
-def update(
+def update_conditions(
     values: Evaluation,
     active: MappingProxyType[AlarmKey, ActiveCondition],
     cooling: Mapping[AlarmKey, float],

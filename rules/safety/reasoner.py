@@ -13,7 +13,7 @@ from visup.rules.formula.units import ticks
 from visup.rules.monitoring.samples import MIN_SPACING
 from visup.rules.monitoring.states import States
 from visup.rules.predicates.snapshot import Snapshot
-from visup.rules.safety.alarm_condition import ActiveCondition, update
+from visup.rules.safety.alarm_condition import ActiveCondition, update_conditions
 from visup.rules.safety.compiled_rules import AlarmKey, CompiledRules, compile_rules
 from visup.rules.safety.verdicts import Evaluation, reindexed_states
 
@@ -94,7 +94,7 @@ class RuleReasoner:
         if old.ids != facts.ids:
             since = MappingProxyType({i: since.get(i, now) for i in facts.ids})
         values = Evaluation(compiled, facts, now, before)
-        held, cooling = update(values, old.active, old.cooling, old.time)
+        active, cooling = update_conditions(values, old.active, old.cooling, old.time)
         mind = mind.remember(
             self.memory,
             RuleMemory(
@@ -105,13 +105,13 @@ class RuleReasoner:
                 before,
                 values.after,
                 mind.tasks,
-                held,
+                active,
                 cooling,
                 self.early,
                 since,
             ),
         )
-        conditions = tuple(h.condition for h in held.values())
+        conditions = tuple(h.condition for h in active.values())
         return Outcome(mind, conditions=once_per_machine(conditions, mind))
 
 

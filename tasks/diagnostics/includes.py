@@ -49,7 +49,7 @@ class _Joiner:
     def join(self, parsed: ParsedFile, chain: tuple[str, ...]) -> ParsedFile:
         whole = replace(parsed, task=replace(parsed.task, includes=()))
         for include in parsed.task.includes:
-            whole = _joined(whole, self.included(include, chain))
+            whole = _merged_files(whole, self.included(include, chain))
         return whole
 
     def included(self, include: Include, chain: tuple[str, ...]) -> ParsedFile:
@@ -87,7 +87,7 @@ class _Joiner:
         return ParsedFile(Task(()), (self.source.fault(code, what, include.span, expected, hint),))
 
 
-def _joined(one: ParsedFile, other: ParsedFile) -> ParsedFile:
+def _merged_files(one: ParsedFile, other: ParsedFile) -> ParsedFile:
     a, b = one.task, other.task
     task = replace(
         a,

@@ -256,10 +256,10 @@ def _simultaneous(once: Sequence[Mapping[Symbol, CourseEvent]], a: Symbol, b: Sy
         return False
     pairs = [(events[a], events[b]) for events in once]
     close = any(abs(x.at - y.at) < SIMULTANEOUS_S for x, y in pairs)
-    return close and all(_overlap(x.interval, y.interval) > SIMULTANEOUS_S for x, y in pairs)
+    return close and all(_common_s(x.interval, y.interval) > SIMULTANEOUS_S for x, y in pairs)
 
 
-def _overlap(a: ActionInterval, b: ActionInterval) -> float:
+def _common_s(a: ActionInterval, b: ActionInterval) -> float:
     return min(a.end, b.end) - max(a.begin, b.begin)
 
 

@@ -92,7 +92,7 @@ class PauseRecord:
     def elapsed(self, conditions: Sequence[StageCondition], since: float, now: float) -> float:
         """Working time between two times: the seconds in which none of the conditions paused it."""
         spans = [s for p in self._of(conditions) for s in p.spans]
-        lost = (min(end, now) - max(start, since) for start, end in _joined(spans))
+        lost = (min(end, now) - max(start, since) for start, end in _disjoint_spans(spans))
         return now - since - sum(x for x in lost if x > 0.0)
 
     def _of(self, conditions: Sequence[StageCondition]) -> Iterator[Pause]:
@@ -109,7 +109,7 @@ def _bounded(spans: tuple[Span, ...]) -> tuple[Span, ...]:
     return ((later - (end - start), until), *others)
 
 
-def _joined(spans: Sequence[Span]) -> Iterator[Span]:
+def _disjoint_spans(spans: Sequence[Span]) -> Iterator[Span]:
     """Overlapping spans made disjoint, so that no time is counted twice."""
     reached = float("-inf")
     for start, end in sorted(spans):

@@ -14,7 +14,7 @@ from visup.tasks.automaton.states import Leaf, State, TaskStep, leaves
 from visup.tasks.verification.concurrent_actions import reset_lapsed_actions
 from visup.tasks.verification.observation import ActionObservation
 from visup.tasks.verification.settings import TaskSettings
-from visup.tasks.verification.step_monitor import BAD, Moment, StepMonitor, over, update
+from visup.tasks.verification.step_monitor import BAD, Moment, StepMonitor, over, update_monitor
 
 Observe = Callable[[TaskStep], ActionObservation]
 """The present observation of a step."""
@@ -50,7 +50,7 @@ class StepModel:
         # A `within` no longer matters once the task is done.
         step = replace(leaf.step, deadlines=()) if done else leaf.step
         meaning = self.actions[step.action]
-        monitor = update(leaf.payload, step, meaning, seen, moment, self.settings)
+        monitor = update_monitor(leaf.payload, step, meaning, seen, moment, self.settings)
         return replace(leaf, payload=monitor)
 
     def held_before(

@@ -125,7 +125,7 @@ def entered(now: float) -> StepMonitor:
     return StepMonitor(entered=now, since=now, after=now)
 
 
-def update(
+def update_monitor(
     monitor: StepMonitor,
     step: TaskStep,
     meaning: ActionDefinition,

@@ -36,7 +36,7 @@ def test_a_mask_is_described_as_by_region_properties(seed: int) -> None:
 
 @given(st.integers(0, 999))
 @settings(deadline=None, max_examples=20)
-def test_specks_go_as_small_objects_do(seed: int) -> None:
+def test_specks_are_removed_as_by_remove_small_objects(seed: int) -> None:
     mask = blobs(seed)
     largest = max(p.area for p in regionprops(label(mask, connectivity=1)))
     kept = remove_small_objects(mask, max_size=int(np.ceil(0.1 * largest)) - 1, connectivity=1)

@@ -268,11 +268,16 @@ def _print_ranking(ranking: Ranking, image: Path, views: int) -> None:
         table.add_column(heading, justify="right", no_wrap=True)
     for rank, m in enumerate(ranking.matches, start=1):
         turn = f"{math.degrees(m.rotation):.0f}°"
-        mirrored = " m" if m.likeness.mirrored else ""
-        terms = (m.similarity, m.likeness.of_graphs, m.likeness.of_outlines, m.likeness.of_areas)
+        mirrored = " m" if m.terms.mirrored else ""
+        terms = (
+            m.similarity,
+            m.terms.graph_similarity,
+            m.terms.outline_similarity,
+            m.terms.area_similarity,
+        )
         figures = (f"{t:.3f}" for t in terms)
         table.add_row(str(rank), m.view.name, str(m.view.number), *figures, turn + mirrored)
     make_console().print(table)
-    if any(m.likeness.mirrored for m in ranking.matches):
+    if any(m.terms.mirrored for m in ranking.matches):
         echo("m: mirrored, as seen from behind")
     echo(f"{ranking.compared} of {views} views compared in full")

@@ -151,12 +151,12 @@ def _place(
     wanted = [y - row - 3, y + h + 3, *range(top, bottom + 1, row)]
     for at in wanted:
         box = (left, min(max(at, top), bottom), w, row)
-        if not any(_overlap(box, other) for other in placed):
+        if not any(_intersect(box, other) for other in placed):
             return box
     return left, min(max(y - row, top), bottom), w, row
 
 
-def _overlap(a: Box, b: Box) -> bool:
+def _intersect(a: Box, b: Box) -> bool:
     return a[0] < b[0] + b[2] and b[0] < a[0] + a[2] and a[1] < b[1] + b[3] and b[1] < a[1] + a[3]
 
 

@@ -41,7 +41,7 @@ def common_part(a: Blob, b: Blob) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]
     return one, other
 
 
-def overlap(a: Blob, b: Blob) -> float:
+def overlap_of_smaller(a: Blob, b: Blob) -> float:
     """Intersection of two blobs as a share of the smaller one, 0 to 1 (not IoU)."""
     part = common_part(a, b)
     if part is None:

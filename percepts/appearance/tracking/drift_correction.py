@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from visup.percepts.appearance.models.appearance_model import ViewModel
-from visup.percepts.appearance.models.blob import Blob, overlap
+from visup.percepts.appearance.models.blob import Blob, overlap_of_smaller
 from visup.percepts.appearance.models.colour_patches import has_similar_colours
 from visup.percepts.appearance.models.pose import PatchPose
 from visup.percepts.appearance.models.scene import Scene
@@ -62,7 +62,7 @@ def correct_drift(
     if doubtful and not _has_colours(track, views, scene):
         # What was tracked resembled the object only while it moved: it is something else.
         return replace(track, state=TrackState.ABSENT, visible=None, rest=None, path=())
-    if best.score <= SURE or blob is None or any(overlap(blob, o) > 0.5 for o in others):
+    if best.score <= SURE or blob is None or any(overlap_of_smaller(blob, o) > 0.5 for o in others):
         return track
     return replace(_reset_to_view(track, number, best, views, scene), confirmed=True)
 

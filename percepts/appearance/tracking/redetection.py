@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from visup.percepts.appearance.background.background_memory import has_changed
 from visup.percepts.appearance.models.appearance_model import Appearance, ViewModel
-from visup.percepts.appearance.models.blob import Blob, overlap
+from visup.percepts.appearance.models.blob import Blob, overlap_of_smaller
 from visup.percepts.appearance.models.colour_patches import ColourPatch, unique_colour_patch
 from visup.percepts.appearance.models.moving_body import MovingBody, colour_similarity
 from visup.percepts.appearance.models.pose import PatchPose, paint, window_of
@@ -215,7 +215,7 @@ def is_unique_by_colour(view: ViewModel) -> bool:
     home = footprint(scene, taught_pose(scene, view), view.appearance)
     seen = (place.visible for place in candidates_by_colour(scene, view, 0))
     return home is not None and any(
-        b is not None and overlap(b, home) > OCCUPIED_SHARE for b in seen
+        b is not None and overlap_of_smaller(b, home) > OCCUPIED_SHARE for b in seen
     )
 
 
@@ -323,7 +323,7 @@ def _is_occupied(
         other: Pixels of the other object.
         other_appearance: Appearance of the other object.
     """
-    if overlap(blob, other) <= OCCUPIED_SHARE:
+    if overlap_of_smaller(blob, other) <= OCCUPIED_SHARE:
         return False
     return (
         candidate.visible is None

@@ -144,7 +144,7 @@ def _unexplained(
     return out
 
 
-def update(
+def update_tracks(
     tracks: Tracks,
     scene: FrameMeasurements,
     labelling: Labelling,

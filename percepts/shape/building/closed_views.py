@@ -1,7 +1,7 @@
-"""Views without their narrow gaps: what segmentation makes of a silhouette whose parts lie close together.
+"""Views with their narrow gaps closed, as segmentation closes them.
 
-Between two panels or the rungs of a ladder a few pixels of background are easily taken into the object. The
-silhouette then has other parts and another outline, and is unlike the view that it shows. So a view with
+Between two panels or the rungs of a ladder a few pixels of background are easily assigned to the object. The
+silhouette then has other parts and another outline, and no longer matches its view. Therefore a view with
 narrow gaps is stored a second time, without them.
 """
 
@@ -11,9 +11,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-REACH = 0.06
+CLOSING_RADIUS = 0.06
 """Radius of the disc that closes gaps, in square roots of the area."""
-WORTH = 0.06
+LEAST_GAIN = 0.06
 """A closed silhouette is stored if its area is larger by this share."""
 
 
@@ -36,10 +36,10 @@ def without_gaps(mask: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
         True
     """
     area = np.count_nonzero(mask)
-    radius = round(REACH * area**0.5)
+    radius = round(CLOSING_RADIUS * area**0.5)
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1))
-    # A border of background, since OpenCV takes what lies beyond an image for whatever suits.
+    # A border of background, since OpenCV treats pixels beyond the image as neutral.
     padded = np.pad(mask, radius + 1).astype(np.uint8)
     closed = cv2.morphologyEx(padded, cv2.MORPH_CLOSE, disc)[radius + 1 : -radius - 1]
     filled = np.asarray(closed[:, radius + 1 : -radius - 1], dtype=np.bool_)
-    return filled if np.count_nonzero(filled) >= (1 + WORTH) * area else None
+    return filled if np.count_nonzero(filled) >= (1 + LEAST_GAIN) * area else None

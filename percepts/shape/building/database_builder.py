@@ -141,28 +141,28 @@ def mesh_views(mesh: Path, count: int = VIEWS, seed: int = 0) -> list[NewView]:
         DatabaseError: The file is not a mesh.
         ExtraMissingError: The renderer is not installed.
     """
-    return merge_symmetric(rendered(mesh, half_sphere_directions(count, seed)))
+    return merge_symmetric(mesh_file_views(mesh, half_sphere_directions(count, seed)))
 
 
-def rendered(mesh: Path, directions: NDArray[np.float64]) -> list[NewView]:
+def mesh_file_views(mesh: Path, directions: NDArray[np.float64]) -> list[NewView]:
     """Views of a mesh file from these directions (V, 3), as `mesh_views` but without merging.
 
     A view with narrow gaps is followed by the same view without them.
     """
     views: list[NewView] = []
-    for seen in render_views(load_mesh(mesh), directions):
-        closed = without_gaps(seen.mask)
-        views += _view_of(mesh.stem, seen)
+    for rendered in render_views(load_mesh(mesh), directions):
+        closed = without_gaps(rendered.mask)
+        views += _view_of(mesh.stem, rendered)
         if closed is not None:
-            views += _view_of(mesh.stem, replace(seen, mask=closed))
+            views += _view_of(mesh.stem, replace(rendered, mask=closed))
     return views
 
 
-def _view_of(name: str, seen: RenderedView) -> Iterator[NewView]:
-    silhouette = normalise(seen.mask)
+def _view_of(name: str, rendered: RenderedView) -> Iterator[NewView]:
+    silhouette = normalise(rendered.mask)
     if silhouette is not None:
-        x, y, z = (float(c) for c in seen.direction)
-        yield NewView(name, (x, y, z), seen.area, shape_of(silhouette))
+        x, y, z = (float(c) for c in rendered.direction)
+        yield NewView(name, (x, y, z), rendered.area, shape_of(silhouette))
 
 
 def silhouette_views(
@@ -180,21 +180,21 @@ def silhouette_views(
     Raises:
         DatabaseError: No mask shows anything.
     """
-    found = [normalise(m, cut=looks_cut(m)) for m in masks]
-    shapes = [shape_of(s) for s in found if s is not None]
+    silhouettes = [normalise(m, cut=looks_cut(m)) for m in masks]
+    shapes = [shape_of(s) for s in silhouettes if s is not None]
     if not shapes:
         raise DatabaseError(
             f"none of {len(masks)} silhouettes for {name!r} shows anything",
             expected="pictures with an object of at least 24 pixels",
         )
     # All pairs are compared, so a long video is subsampled evenly.
-    every = np.linspace(0, len(shapes) - 1, min(len(shapes), MOST_CLUSTERED)).round().astype(int)
-    some = [shapes[k] for k in every]
-    cut = [s for s in some if s.cut]
-    of_cut = round(clusters * len(cut) / len(some))
-    if 0 < len(cut) < len(some) and clusters > 1:
-        of_cut = min(max(1, of_cut), clusters - 1)
-    groups = (([s for s in some if not s.cut], clusters - of_cut), (cut, of_cut))
+    indices = np.linspace(0, len(shapes) - 1, min(len(shapes), MOST_CLUSTERED)).round().astype(int)
+    sample = [shapes[k] for k in indices]
+    cut = [s for s in sample if s.cut]
+    cut_count = round(clusters * len(cut) / len(sample))
+    if 0 < len(cut) < len(sample) and clusters > 1:
+        cut_count = min(max(1, cut_count), clusters - 1)
+    groups = (([s for s in sample if not s.cut], clusters - cut_count), (cut, cut_count))
     return [
         NewView(name, None, None, group[k])
         for group, count in groups
@@ -254,17 +254,17 @@ def build_database(
         raise SettingsError(f"{views} views of each mesh were asked for", expected="1 to 10000")
     target = Path(path)
     folder = building_folder(target)
-    every = [parts_of(mesh, folder, views, options.get("seed", 0)) for mesh in meshes]
-    _make([p for parts in every for p in parts], jobs, progress)
+    parts_by_mesh = [parts_of(mesh, folder, views, options.get("seed", 0)) for mesh in meshes]
+    _make_parts([p for parts in parts_by_mesh for p in parts], jobs, progress)
 
-    def stored() -> Iterator[NewView]:
-        for parts in every:
+    def all_views() -> Iterator[NewView]:
+        for parts in parts_by_mesh:
             yield from merge_symmetric([v for part in parts for v in read_part(part)])
         for name, masks in silhouettes.items():
             yield from silhouette_views(name, masks, options.get("clusters", CLUSTERS))
 
-    kept = (_read_mesh_model(mesh) for mesh in meshes)
-    built = ModelDatabase.create(target, stored(), kept)
+    mesh_models = (_read_mesh_model(mesh) for mesh in meshes)
+    built = ModelDatabase.create(target, all_views(), mesh_models)
     shutil.rmtree(folder, ignore_errors=True)
     return built
 
@@ -282,42 +282,42 @@ def building_folder(target: Path) -> Path:
 
 def _check_names(meshes: Sequence[Path]) -> None:
     stems = [m.stem for m in meshes]
-    twice = sorted({s for s in stems if stems.count(s) > 1})
-    if twice:
+    duplicates = sorted({s for s in stems if stems.count(s) > 1})
+    if duplicates:
         raise SettingsError(
-            f"several meshes would be named {twice[0]!r}",
+            f"several meshes would be named {duplicates[0]!r}",
             expected="mesh files with different stems",
             hint="rename one of them: a model is named after its file",
         )
 
 
-def _make(parts: Sequence[BuildPart], jobs: int, progress: Progress | None) -> None:
+def _make_parts(parts: Sequence[BuildPart], jobs: int, progress: Progress | None) -> None:
     """Make all missing parts."""
     done, total = 0, sum(p.count for p in parts)
 
-    def tell(part: BuildPart) -> None:
+    def report_progress(part: BuildPart) -> None:
         nonlocal done
         done += part.count
         if progress is not None:
             progress(done, total, part.mesh.stem)
 
-    left = []
+    missing = []
     for part in parts:
         if is_made(part):
-            tell(part)
+            report_progress(part)
         else:
-            left.append(part)
-    if jobs <= 1 or len(left) <= 1:
-        for part in left:
+            missing.append(part)
+    if jobs <= 1 or len(missing) <= 1:
+        for part in missing:
             make_part(part)
-            tell(part)
+            report_progress(part)
         return
-    with ProcessPoolExecutor(min(jobs, len(left)), mp_context=get_context("spawn")) as pool:
-        waiting = {pool.submit(make_part, part): part for part in left}
+    with ProcessPoolExecutor(min(jobs, len(missing)), mp_context=get_context("spawn")) as pool:
+        futures = {pool.submit(make_part, part): part for part in missing}
         try:
-            for finished in as_completed(waiting):
+            for finished in as_completed(futures):
                 finished.result()
-                tell(waiting[finished])
+                report_progress(futures[finished])
         except BaseException:
             pool.shutdown(wait=True, cancel_futures=True)
             raise
@@ -331,7 +331,7 @@ def make_part(part: BuildPart) -> None:
         ExtraMissingError: The renderer is not installed.
     """
     directions = half_sphere_directions(part.views, part.seed)[part.first : part.first + part.count]
-    new = rendered(part.mesh, directions)
+    new = mesh_file_views(part.mesh, directions)
     try:
         part.path.parent.mkdir(exist_ok=True)
     except OSError as e:

@@ -61,10 +61,10 @@ def sphere_directions(count: int, seed: int = 0) -> NDArray[np.float64]:
     """
     k = np.arange(count) + 0.5
     z = 1 - 2 * k / count
-    turn = np.pi * (1 + 5**0.5) * k
+    angle = np.pi * (1 + 5**0.5) * k
     flat = np.sqrt(1 - z**2)
-    lattice = np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)
-    return lattice if seed == 0 else np.asarray(lattice @ _turn(seed).T)
+    lattice = np.stack([flat * np.cos(angle), flat * np.sin(angle), z], axis=1)
+    return lattice if seed == 0 else np.asarray(lattice @ _random_rotation(seed).T)
 
 
 def half_sphere_directions(count: int, seed: int = 0) -> NDArray[np.float64]:
@@ -88,19 +88,19 @@ def half_sphere_directions(count: int, seed: int = 0) -> NDArray[np.float64]:
     """
     lattice = sphere_directions(2 * count)[:count]
     # A large lattice is even enough, and each step would be slow.
-    spread = _spread(lattice) if count <= _MOST_SPREAD else lattice
-    return spread if seed == 0 else np.asarray(spread @ _turn(seed).T)
+    spread = _repelled(lattice) if count <= _MOST_SPREAD else lattice
+    return spread if seed == 0 else np.asarray(spread @ _random_rotation(seed).T)
 
 
-def _spread(directions: NDArray[np.float64]) -> NDArray[np.float64]:
+def _repelled(directions: NDArray[np.float64]) -> NDArray[np.float64]:
     """Repel directions and their opposites from one another, like charges on a sphere."""
     out, size = directions.copy(), len(directions)
     spacing = np.sqrt(2 * np.pi / size)
     for step in range(_STEPS):
-        apart = out[:, None] - np.concatenate([out, -out])[None]
-        squares = (apart**2).sum(axis=-1)
+        differences = out[:, None] - np.concatenate([out, -out])[None]
+        squares = (differences**2).sum(axis=-1)
         squares[np.arange(size), np.arange(size)] = np.inf
-        force = (apart / squares[..., None] ** 1.5).sum(axis=1)
+        force = (differences / squares[..., None] ** 1.5).sum(axis=1)
         force -= (force * out).sum(axis=1, keepdims=True) * out
         strongest = max(float(np.linalg.norm(force, axis=1).max()), 1e-12)
         out += force * (0.3 * spacing / strongest * (1 - step / _STEPS))
@@ -108,7 +108,7 @@ def _spread(directions: NDArray[np.float64]) -> NDArray[np.float64]:
     return out
 
 
-def _turn(seed: int) -> NDArray[np.float64]:
+def _random_rotation(seed: int) -> NDArray[np.float64]:
     """A random rotation."""
     q, r = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
     return np.asarray(q * np.sign(np.diag(r)))
@@ -153,8 +153,8 @@ def _has_size(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> bool:
     """Whether all triangles refer to existing vertices, finite and not all at one point."""
     if faces.size == 0 or vertices.size == 0 or not np.isfinite(vertices).all():
         return False
-    there = faces.min() >= 0 and faces.max() < len(vertices)
-    return bool(there and np.ptp(vertices) > 0.0)
+    valid = faces.min() >= 0 and faces.max() < len(vertices)
+    return bool(valid and np.ptp(vertices) > 0.0)
 
 
 def render_views(

@@ -24,7 +24,7 @@ from visup.percepts.shape.database.file_reader import open_checked, read_content
 from visup.percepts.shape.index.view_records import Direction, InvalidRecordError, ModelView, decode
 from visup.percepts.shape.matching.shape_similarity import Shape
 
-CACHED = 4096
+MOST_CACHED = 4096
 """Most shapes cached in memory, about 20 kB each."""
 
 
@@ -128,7 +128,7 @@ class Shapes(Sequence[Shape]):
     def __init__(self, path: Path, views: Views) -> None:
         self._path = path
         self._views = views
-        self._kept: OrderedDict[int, Shape] = OrderedDict()
+        self._cache: OrderedDict[int, Shape] = OrderedDict()
         self._lock = Lock()
 
     def __len__(self) -> int:
@@ -156,13 +156,13 @@ class Shapes(Sequence[Shape]):
 
     def _shape(self, number: int) -> Shape:
         with self._lock:
-            cached = self._kept.get(number)
+            cached = self._cache.get(number)
             if cached is None:
-                cached = self._kept[number] = self._read(number)
-                if len(self._kept) > CACHED:
-                    self._kept.popitem(last=False)
+                cached = self._cache[number] = self._read(number)
+                if len(self._cache) > MOST_CACHED:
+                    self._cache.popitem(last=False)
             else:
-                self._kept.move_to_end(number)
+                self._cache.move_to_end(number)
             return cached
 
     def _read(self, number: int) -> Shape:

@@ -26,13 +26,13 @@ APPLICATION_ID = 0x76697375
 VERSION = 3
 """Version of the tables; a newer file is refused, since its meaning is unknown."""
 
-OLDEST = 2
+OLDEST_VERSION = 2
 """Oldest version that can be read."""
 
-BLOCK = 1024
+VIEWS_PER_BLOCK = 1024
 """Most views in a block."""
 
-MOST_NAME = 200
+LONGEST_NAME = 200
 """Most characters in a model's name."""
 
 TABLES = (
@@ -48,10 +48,10 @@ TABLES = (
     "CREATE TABLE meshes (number INTEGER PRIMARY KEY, name TEXT NOT NULL, radius REAL NOT NULL, "
     "vertices BLOB NOT NULL, faces BLOB NOT NULL, crc INTEGER NOT NULL)",
 )
-TABLES_OF = {OLDEST: TABLES[:-2], VERSION: TABLES}
+TABLES_OF_VERSION = {OLDEST_VERSION: TABLES[:-2], VERSION: TABLES}
 """Version -> its tables."""
 
-MOST_BYTES = 1 << 25
+LARGEST_ROW_BYTES = 1 << 25
 """Largest row: it must hold the image of a large object in a large frame."""
 
 # Messages about damaged tables quote their content, which may not be valid text.

@@ -15,14 +15,14 @@ import numpy as np
 from visup.agent.model.errors import DatabaseError
 from visup.percepts.shape.database.file_format import (
     APPLICATION_ID,
-    BLOCK,
     BUILD_HINT,
-    MOST_BYTES,
-    MOST_NAME,
-    OLDEST,
-    TABLES_OF,
+    LARGEST_ROW_BYTES,
+    LONGEST_NAME,
+    OLDEST_VERSION,
+    TABLES_OF_VERSION,
     UNREADABLE,
     VERSION,
+    VIEWS_PER_BLOCK,
     FileContents,
     checksum,
     damaged,
@@ -91,11 +91,11 @@ def _check_header(path: Path) -> None:
             expected=f"application id {APPLICATION_ID:#x}",
             hint=BUILD_HINT,
         )
-    if version not in TABLES_OF:
+    if version not in TABLES_OF_VERSION:
         raise DatabaseError(
             f"this model database is of version {version}",
             where=str(path),
-            expected=f"version {OLDEST} to {VERSION}",
+            expected=f"version {OLDEST_VERSION} to {VERSION}",
             hint="use a newer visup for it" if version > VERSION else BUILD_HINT,
         )
     # A page size of 65536 does not fit its field and is written as 1.
@@ -111,12 +111,12 @@ def _check_header(path: Path) -> None:
 
 def _check_tables(path: Path, file: sqlite3.Connection) -> None:
     """Allow only our own tables: a view or trigger in a foreign file could run for ever."""
-    file.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MOST_BYTES)
+    file.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST_ROW_BYTES)
     file.execute("PRAGMA trusted_schema = OFF")
     file.execute("PRAGMA cell_size_check = ON")
     query = "SELECT sql FROM sqlite_master WHERE sql IS NOT NULL LIMIT 50"
     found = sorted(str(sql) for (sql,) in file.execute(query))
-    tables = TABLES_OF[version_of(file)]
+    tables = TABLES_OF_VERSION[version_of(file)]
     if found != sorted(tables):
         raise damaged(path, "its tables are not those of a model database", "; ".join(tables))
     layout = dict(file.execute("SELECT part, meaning FROM layout LIMIT 50").fetchall())
@@ -149,9 +149,9 @@ def read_contents(path: Path) -> FileContents:
             (last,) = file.execute("SELECT max(view) FROM shapes").fetchone()
             if (-1 if last is None else last) != len(views) - 1:
                 raise InvalidRecordError("other views than shapes")
-            recent = version_of(file) > OLDEST
-            taught = read_taught(file) if recent else ()
-            meshes = read_meshes(file) if recent else ()
+            has_taught_views = version_of(file) > OLDEST_VERSION
+            taught = read_taught(file) if has_taught_views else ()
+            meshes = read_meshes(file) if has_taught_views else ()
         except InvalidRecordError as e:
             raise damaged(path, str(e), "what 'visup models' writes") from e
         except UNREADABLE as e:
@@ -163,7 +163,7 @@ def _read_names(file: sqlite3.Connection) -> tuple[str, ...]:
     names: list[str] = []
     for code, name, crc in file.execute("SELECT code, name, crc FROM models ORDER BY code"):
         # A damaged B-tree may contain cycles: reading stops unless codes count up.
-        if code != len(names) or not isinstance(name, str) or not 0 < len(name) <= MOST_NAME:
+        if code != len(names) or not isinstance(name, str) or not 0 < len(name) <= LONGEST_NAME:
             raise InvalidRecordError(f"model {len(names)} without a name")
         if crc != checksum(code, name.encode()):
             raise InvalidRecordError(f"a wrong check sum of model {code}")
@@ -179,8 +179,10 @@ def _read_blocks(file: sqlite3.Connection) -> tuple[Records, Records]:
     for expected, (number, data, further, crc) in enumerate(file.execute(query)):
         if number != expected:
             raise InvalidRecordError(f"block {expected} is missing")
-        rows = records(data, VIEW, 1, BLOCK, f"views in block {number}")
-        others = records(further, ALSO, 0, BLOCK * 10_000, f"directions in block {number}")
+        rows = records(data, VIEW, 1, VIEWS_PER_BLOCK, f"views in block {number}")
+        others = records(
+            further, ALSO, 0, VIEWS_PER_BLOCK * 10_000, f"directions in block {number}"
+        )
         if crc != checksum(number, data, further):
             raise InvalidRecordError(f"a wrong check sum of block {number}")
         views.append(rows)
@@ -207,7 +209,7 @@ def _check_views(views: Records, also: Records, models: int) -> None:
     unknown = np.isnan(directions).all(axis=1)
     unknown[len(views) :] = False
     area, smoothing = views["area"], views["smoothing"]
-    for sound, what in (
+    for valid, what in (
         (unknown | (np.abs(length - 1) < 1e-3), "a direction that is not a unit vector"),
         (np.isnan(area) | ((area > 0) & np.isfinite(area)), "an area that cannot be"),
         ((smoothing >= 0) & (smoothing < 1), "a smoothing that cannot be"),
@@ -216,7 +218,7 @@ def _check_views(views: Records, also: Records, models: int) -> None:
         (also["view"] < len(views), "a direction of no view"),
         (np.diff(also["view"].astype(np.int64)) >= 0, "directions in disorder"),
     ):
-        if not bool(sound.all()):
+        if not bool(valid.all()):
             raise InvalidRecordError(what)
     check_nodes(views["root"])
 

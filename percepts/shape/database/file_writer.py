@@ -19,10 +19,10 @@ from visup.agent.storage.atomic import replacing
 from visup.agent.storage.file_lock import only_writer
 from visup.percepts.shape.database.file_format import (
     APPLICATION_ID,
-    BLOCK,
     TABLES,
-    TABLES_OF,
+    TABLES_OF_VERSION,
     VERSION,
+    VIEWS_PER_BLOCK,
     FileContents,
     checksum,
 )
@@ -44,7 +44,7 @@ from visup.percepts.shape.refinement.mesh_model import MeshModel
 from visup.percepts.shape.silhouette.height_functions import outline_heights
 from visup.percepts.taught.taught_view import TaughtView
 
-WHAT = "this model database"
+LOCK_NAME = "this model database"
 """Name of a database in messages about the file lock."""
 
 
@@ -60,7 +60,7 @@ def write_new(
         DatabaseError: The file cannot be written; nothing is left behind.
     """
     with (
-        only_writer(path, WHAT),
+        only_writer(path, LOCK_NAME),
         _replacing(path) as temporary,
         closing(sqlite3.connect(temporary)) as file,
     ):
@@ -85,18 +85,18 @@ def write_more(
     Raises:
         DatabaseError: The file is not a readable database, or cannot be written.
     """
-    with only_writer(path, WHAT), _replacing(path) as temporary:
-        before = read_contents(path)  # read while holding the lock
+    with only_writer(path, LOCK_NAME), _replacing(path) as temporary:
+        contents = read_contents(path)  # read while holding the lock
         shutil.copyfile(path, temporary)
         with closing(sqlite3.connect(temporary)) as file:
             _upgrade(file)
-            _insert(file, before, views)
-            insert_taught(file, len(before.taught), map(encoded, taught))
+            _insert(file, contents, views)
+            insert_taught(file, len(contents.taught), map(encoded, taught))
 
 
 def _upgrade(file: sqlite3.Connection) -> None:
     """Add the tables that an older file lacks."""
-    for table in TABLES[len(TABLES_OF[version_of(file)]) :]:
+    for table in TABLES[len(TABLES_OF_VERSION[version_of(file)]) :]:
         file.execute(table)
     file.execute(f"PRAGMA user_version = {VERSION}")
 
@@ -122,14 +122,14 @@ def _insert(file: sqlite3.Connection, before: FileContents, views: Iterable[NewV
     codes = {name: code for code, name in enumerate(before.names)}
     numbers = dict(enumerate(np.bincount(before.views["model"], minlength=len(codes)).tolist()))
     (blocks,) = file.execute("SELECT coalesce(max(number), -1) + 1 FROM blocks").fetchone()
-    start, coming = len(before.views), iter(views)
+    start, remaining = len(before.views), iter(views)
     with file:
-        while new := list(islice(coming, BLOCK)):
+        while new := list(islice(remaining, VIEWS_PER_BLOCK)):
             for view in new:
                 if view.name not in codes:
                     codes[view.name] = code = len(codes)
-                    known = (code, view.name, checksum(code, view.name.encode()))
-                    file.execute("INSERT INTO models VALUES (?, ?, ?)", known)
+                    model_row = (code, view.name, checksum(code, view.name.encode()))
+                    file.execute("INSERT INTO models VALUES (?, ?, ?)", model_row)
             rows, also = _block(new, start, codes, numbers)
             data = (rows.tobytes(), also.tobytes())
             row = (blocks, *data, checksum(blocks, *data))

@@ -38,10 +38,10 @@ def read_meshes(file: sqlite3.Connection) -> tuple[MeshRow, ...]:
     rows: list[MeshRow] = []
     query = "SELECT number, name, radius, vertices, faces, crc FROM meshes ORDER BY number"
     for expected, (number, name, radius, vertices, faces, crc) in enumerate(file.execute(query)):
-        sound = isinstance(vertices, bytes) and isinstance(faces, bytes)
-        sound &= isinstance(name, str) and isinstance(radius, float)
+        valid = isinstance(vertices, bytes) and isinstance(faces, bytes)
+        valid &= isinstance(name, str) and isinstance(radius, float)
         row = MeshRow(name, radius, vertices, faces)
-        if number != expected or not sound or crc != row.checksum(number):
+        if number != expected or not valid or crc != row.checksum(number):
             raise InvalidRecordError(f"a wrong check sum of mesh {expected + 1}")
         rows.append(row)
     if len({row.name for row in rows}) < len(rows):

@@ -17,7 +17,7 @@ from visup.agent.storage.file_lock import only_writer
 from visup.percepts.shape.database.catalogue import Shapes, Views
 from visup.percepts.shape.database.file_format import MeshRow, TaughtRow
 from visup.percepts.shape.database.file_reader import read_contents
-from visup.percepts.shape.database.file_writer import WHAT, write_more, write_new
+from visup.percepts.shape.database.file_writer import LOCK_NAME, write_more, write_new
 from visup.percepts.shape.database.mesh_records import decoded_mesh
 from visup.percepts.shape.database.search import Ranking, SearchLimits, ViewMatch, ViewSearch
 from visup.percepts.shape.database.taught_records import decoded, encoded
@@ -29,7 +29,7 @@ from visup.percepts.shape.refinement.mesh_model import MeshModel
 from visup.percepts.shape.silhouette.silhouette import Silhouette, looks_cut, normalise
 from visup.percepts.taught.taught_view import TaughtView
 
-__all__ = ["ModelDatabase", "Ranking", "ViewMatch", "as_shape", "candidates_wanted"]
+__all__ = ["ModelDatabase", "Ranking", "ViewMatch", "as_shape", "candidate_count"]
 
 CANDIDATES = 20
 """Views whose outlines are compared, unless a budget allows fewer."""
@@ -96,7 +96,7 @@ class ModelDatabase:
         Raises:
             DatabaseError: The file is not a valid database, or cannot be written.
         """
-        with only_writer(Path(path), WHAT):
+        with only_writer(Path(path), LOCK_NAME):
             return cls.open(path) if Path(path).exists() else cls.create(path)
 
     @classmethod
@@ -161,10 +161,10 @@ class ModelDatabase:
         Returns:
             Its neighbours, ascending by number; none when its direction is unknown.
         """
-        own = self.views.named({view.name})
+        of_model = self.views.named({view.name})
         if view.name not in self._neighbours:
-            self._neighbours[view.name] = neighbours([self.views[k].seen_from for k in own])
-        return tuple(self.views[own[k]] for k in self._neighbours[view.name][view.number])
+            self._neighbours[view.name] = neighbours([self.views[k].seen_from for k in of_model])
+        return tuple(self.views[of_model[k]] for k in self._neighbours[view.name][view.number])
 
     def query_all(
         self,
@@ -214,14 +214,14 @@ class ModelDatabase:
             DatabaseError: The file cannot be written, or a view is too large; it stays as it was.
         """
         new = {encoded(v).checksum(0): v for v in views}
-        with only_writer(self.path, WHAT):
+        with only_writer(self.path, LOCK_NAME):
             # Another process may have taught the same since this database was opened.
-            known = {row.checksum(0) for row in read_contents(self.path).taught}
-            fresh = [view for key, view in new.items() if key not in known]
-            if not fresh:
+            stored = {row.checksum(0) for row in read_contents(self.path).taught}
+            not_stored = [view for key, view in new.items() if key not in stored]
+            if not not_stored:
                 return ModelDatabase.open(self.path)
-            seen = [taught_silhouette(v) for v in fresh] if silhouettes else []
-            write_more(self.path, [s for s in seen if s is not None], fresh)
+            silhouette_views = [taught_silhouette(v) for v in not_stored] if silhouettes else []
+            write_more(self.path, [s for s in silhouette_views if s is not None], not_stored)
             return ModelDatabase.open(self.path)
 
     def query(
@@ -251,26 +251,26 @@ class ModelDatabase:
         if query is None or not self.views:
             return Ranking((), 0)
         among = self.views.named(options.get("restrict"))
-        most = candidates_wanted(len(self.views), budget)
-        wanted = SearchLimits(
+        most_compared = candidate_count(len(self.views), budget)
+        limits = SearchLimits(
             options.get("top", 10),
             options.get("per_name"),
             options.get("threshold", 0.0),
-            most,
+            most_compared,
             options.get("mirror", True),
         )
         first = options.get("try_first")
-        favoured = np.intersect1d(self.views.named(first), among) if first else None
+        always_included = np.intersect1d(self.views.named(first), among) if first else None
         if not query.cut or query.border is None:
-            return self._search.whole(query, among, wanted, favoured)
+            return self._search.rank_whole(query, among, limits, always_included)
         cut_views = self.views.cut[among]
-        alike = self._search.whole(query, among[cut_views], wanted, favoured)
-        parts = self._search.cut(query, among[~cut_views], wanted)
-        matches = wanted.best([*alike.matches, *parts.matches])
-        return Ranking(tuple(matches), alike.compared + parts.compared)
+        whole_matches = self._search.rank_whole(query, among[cut_views], limits, always_included)
+        cut_matches = self._search.rank_cut(query, among[~cut_views], limits)
+        matches = limits.best([*whole_matches.matches, *cut_matches.matches])
+        return Ranking(tuple(matches), whole_matches.compared + cut_matches.compared)
 
 
-def candidates_wanted(views: int, budget: float = 0.1) -> int:
+def candidate_count(views: int, budget: float = 0.1) -> int:
     """Number of `views` compared in full: a share of them, within limits (see `query`)."""
     if budget >= 1:
         return views

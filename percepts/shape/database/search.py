@@ -22,14 +22,14 @@ from visup.percepts.shape.matching.cut_outlines import compare_cut_outlines
 from visup.percepts.shape.matching.graph_matching import (
     GraphMatch,
     MatchWeights,
-    match_ceiling,
     match_nodes,
+    match_upper_bound,
 )
 from visup.percepts.shape.matching.shape_similarity import (
     AREA_POWER,
-    Likeness,
     OutlineAreaSimilarities,
     Shape,
+    ShapeSimilarity,
     compare_outlines_and_areas,
 )
 from visup.percepts.shape.matching.truncated_views import CutIndex, CutLine, query_map
@@ -60,18 +60,18 @@ class ViewMatch:
 
     Attributes:
         view: The view.
-        likeness: Their similarity and its terms; pairs of nodes are (query, view, similarity).
+        terms: Their similarity and its terms; pairs of nodes are (query, view, similarity).
         cut: Where the view was cut to match a silhouette cut by the image border.
     """
 
     view: ModelView
-    likeness: Likeness
+    terms: ShapeSimilarity
     cut: CutLine | None = None
 
     @property
     def similarity(self) -> float:
         """0 to 1."""
-        return self.likeness.similarity
+        return self.terms.similarity
 
     @property
     def rotation(self) -> float:
@@ -80,7 +80,7 @@ class ViewMatch:
         For a mirrored match, the rotation from the view's left-right mirror image, which is the silhouette
         from the opposite direction.
         """
-        return self.likeness.rotation
+        return self.terms.rotation
 
     @property
     def direction(self) -> tuple[float, float, float] | None:
@@ -89,7 +89,7 @@ class ViewMatch:
         In parallel projection the silhouette from behind is the mirror image of the one from the front, so
         a mirrored match indicates the opposite direction.
         """
-        if self.view.direction is None or not self.likeness.mirrored:
+        if self.view.direction is None or not self.terms.mirrored:
             return self.view.direction
         x, y, z = self.view.direction
         return (-x, -y, -z)
@@ -128,12 +128,12 @@ class SearchLimits:
 
     def best(self, found: Iterable[ViewMatch]) -> list[ViewMatch]:
         """The best matches, at most `per_name` of one model."""
-        seen: dict[str, int] = {}
+        count_of_model: dict[str, int] = {}
         chosen = []
         for m in sorted(found, key=lambda m: (-m.similarity, m.view.id)):
-            seen[m.view.name] = seen.get(m.view.name, 0) + 1
-            within = self.per_name is None or seen[m.view.name] <= self.per_name
-            if within and m.similarity >= self.threshold:
+            count_of_model[m.view.name] = count_of_model.get(m.view.name, 0) + 1
+            is_allowed = self.per_name is None or count_of_model[m.view.name] <= self.per_name
+            if is_allowed and m.similarity >= self.threshold:
                 chosen.append(m)
         return chosen[: self.top]
 
@@ -147,8 +147,8 @@ class SearchLimits:
         least = found[-1].similarity if len(found) >= self.top else self.threshold
         if self.per_name is None:
             return least
-        own = [m.similarity for m in found if m.view.name == name]
-        return max(least, own[-1]) if len(own) >= self.per_name else least
+        of_model = [m.similarity for m in found if m.view.name == name]
+        return max(least, of_model[-1]) if len(of_model) >= self.per_name else least
 
 
 class ViewSearch:
@@ -177,108 +177,113 @@ class ViewSearch:
     def _cut_index(self) -> CutIndex:
         return CutIndex(self._shapes)
 
-    def whole(
+    def rank_whole(
         self,
         query: Shape,
         among: NDArray[np.intp],
-        wanted: SearchLimits,
-        favoured: NDArray[np.intp] | None = None,
+        limits: SearchLimits,
+        always_included: NDArray[np.intp] | None = None,
     ) -> Ranking:
         """The views most similar to a shape as it is.
 
         Args:
             query: The shape.
             among: Numbers of the views to search, ascending.
-            wanted: Limits.
-            favoured: Numbers of views of which as many again are compared, regardless of the index.
+            limits: Limits.
+            always_included: Numbers of views; the likeliest of these are compared as well, as many again.
         """
-        likely = self.index.candidates(query, among, wanted.most, favoured)
-        shapes = [self._shapes[k] for k in likely.numbers]
-        rigid = ~np.isnan(self._views.records["direction"][likely.numbers, 0])
+        candidates = self.index.candidates(query, among, limits.most, always_included)
+        shapes = [self._shapes[k] for k in candidates.numbers]
+        rigid = ~np.isnan(self._views.records["direction"][candidates.numbers, 0])
         comparison = compare_outlines_and_areas(
-            query, shapes, likely.overlaps, mirror=wanted.mirror, rigid=rigid
+            query, shapes, candidates.overlaps, mirror=limits.mirror, rigid=rigid
         )
-        share, worth = comparison.shares[:, 0], comparison.worth
-        ceilings = share * likely.bounds + worth
+        share, partial = comparison.shares[:, 0], comparison.partial_similarity
+        upper_bounds = share * candidates.bounds + partial
         found: list[ViewMatch] = []
-        for n in np.argsort(-ceilings, kind="stable"):
-            number = int(likely.numbers[n])
-            least = wanted.least(found, self._views.name_of(number))
-            if ceilings[n] < least:
+        for n in np.argsort(-upper_bounds, kind="stable"):
+            number = int(candidates.numbers[n])
+            to_beat = limits.least(found, self._views.name_of(number))
+            if upper_bounds[n] < to_beat:
                 continue
             graph, root = self._shapes[number].graph, self.index.weights.root
-            ceiling = match_ceiling(query.graph, graph, likely.similar[n], root)
-            if share[n] * ceiling + worth[n] < least:
+            upper_bound = match_upper_bound(query.graph, graph, candidates.similarities[n], root)
+            if share[n] * upper_bound + partial[n] < to_beat:
                 continue
-            likeness = comparison.joined(int(n), self._match(query, number, likely.similar[n]))
-            found = wanted.best([*found, ViewMatch(self._views[number], likeness)])
-        return Ranking(tuple(found), len(likely.numbers))
+            terms = comparison.with_graph(
+                int(n), self._match(query, number, candidates.similarities[n])
+            )
+            found = limits.best([*found, ViewMatch(self._views[number], terms)])
+        return Ranking(tuple(found), len(candidates.numbers))
 
-    def _match(self, query: Shape, number: int, similar: NDArray[np.float32]) -> GraphMatch:
+    def _match(self, query: Shape, number: int, similarities: NDArray[np.float32]) -> GraphMatch:
         """Match graphs in a canonical order, so that the result does not depend on the caller."""
         a, b = query.graph, self._shapes[number].graph
         root = self.index.weights.root
         if b.key < a.key:
-            return match_nodes(b, a, similar.T, root).turned()
-        return match_nodes(a, b, similar, root)
+            return match_nodes(b, a, similarities.T, root).swapped()
+        return match_nodes(a, b, similarities, root)
 
-    def cut(self, query: Shape, among: NDArray[np.intp], wanted: SearchLimits) -> Ranking:
+    def rank_cut(self, query: Shape, among: NDArray[np.intp], limits: SearchLimits) -> Ranking:
         """The whole views most similar to a shape cut by the image border.
 
         Args:
             query: The shape; its border must be known.
             among: Numbers of the whole views to search, ascending.
-            wanted: Limits.
+            limits: Limits.
         """
         border = query.border
         if border is None or not len(among):
             return Ranking((), 0)
         if len(among) > CUT_VIEWS:
-            among = self.index.best_covered(query, among, CUT_VIEWS)
-        own = query_map(query.contour, border)
-        breadth = CUT_BREADTH * wanted.most
-        likely = self._cut_index.likeliest(own, among, breadth, mirror=wanted.mirror)
-        comparison = self._compare_cut_outlines(query.contour, border, likely)
-        worth = comparison.worth
+            among = self.index.best_overlapping(query, among, CUT_VIEWS)
+        map_of_query = query_map(query.contour, border)
+        breadth = CUT_BREADTH * limits.most
+        candidates = self._cut_index.likeliest(map_of_query, among, breadth, mirror=limits.mirror)
+        comparison = self._compare_cut_outlines(query.contour, border, candidates)
+        partial = comparison.partial_similarity
         found: list[ViewMatch] = []
-        for n in np.argsort(-worth, kind="stable"):
-            number, cut = likely[n]
-            least = wanted.least(found, self._views.name_of(number))
-            if CUT_SHARE * (CUT_SHARES[0] + float(worth[n])) < least:
+        for n in np.argsort(-partial, kind="stable"):
+            number, cut = candidates[n]
+            to_beat = limits.least(found, self._views.name_of(number))
+            if CUT_SHARE * (CUT_SHARES[0] + float(partial[n])) < to_beat:
                 continue
-            graphs = self._part(query, number, cut, least / CUT_SHARE - worth[n])
-            likeness = comparison.joined(int(n), graphs)
-            lowered = replace(likeness, similarity=round(CUT_SHARE * likeness.similarity, 5))
-            found = wanted.best([*found, ViewMatch(self._views[number], lowered, cut)])
-        return Ranking(tuple(found), len(likely))
+            graphs = self._match_part(query, number, cut, to_beat / CUT_SHARE - partial[n])
+            terms = comparison.with_graph(int(n), graphs)
+            scaled = replace(terms, similarity=round(CUT_SHARE * terms.similarity, 5))
+            found = limits.best([*found, ViewMatch(self._views[number], scaled, cut)])
+        return Ranking(tuple(found), len(candidates))
 
     def _compare_cut_outlines(
-        self, contour: NDArray[np.floating], border: float, likely: Sequence[tuple[int, CutLine]]
+        self,
+        contour: NDArray[np.floating],
+        border: float,
+        candidates: Sequence[tuple[int, CutLine]],
     ) -> OutlineAreaSimilarities:
         """Outline and area similarities of a cut silhouette with views, each cut by its line."""
-        views = [self._shapes[number].contour for number, _ in likely]
-        lines = np.array([(c.bearing, c.offset, c.mirrored) for _, c in likely]).reshape(-1, 3)
+        views = [self._shapes[number].contour for number, _ in candidates]
+        lines = np.array([(c.bearing, c.offset, c.mirrored) for _, c in candidates]).reshape(-1, 3)
         mirrored = lines[:, 2] > 0
         # The border fixes the rotation.
-        turned = np.where(mirrored, border + lines[:, 0] - np.pi, border - lines[:, 0])
+        rotation = np.where(mirrored, border + lines[:, 0] - np.pi, border - lines[:, 0])
         return OutlineAreaSimilarities(
             compare_cut_outlines(contour, border, views, lines),
-            np.array([c.similarity for _, c in likely]) ** AREA_POWER,
+            np.array([c.similarity for _, c in candidates]) ** AREA_POWER,
             mirrored,
-            np.angle(np.exp(1j * turned)),
-            np.broadcast_to(CUT_SHARES, (len(likely), 3)),
+            np.angle(np.exp(1j * rotation)),
+            np.broadcast_to(CUT_SHARES, (len(candidates), 3)),
         )
 
-    def _part(self, query: Shape, number: int, cut: CutLine, least: float) -> GraphMatch:
+    def _match_part(self, query: Shape, number: int, cut: CutLine, to_beat: float) -> GraphMatch:
         """The query's graph as a part of a view's, in the view's unit of length.
 
-        Not matched when an upper bound shows that the similarity cannot reach `least`.
+        Not matched when an upper bound shows that the similarity cannot reach `to_beat`.
         """
         graph = _scaled(query.graph, (1.0 - cut.share) ** 0.5)
-        bounds, similar = self._part_index.bounds(graph, np.array([number]), part=True)
-        if CUT_SHARES[0] * bounds[0] < least:
+        bounds, similarities = self._part_index.bounds(graph, np.array([number]), part=True)
+        if CUT_SHARES[0] * bounds[0] < to_beat:
             return GraphMatch(0.0, ())
-        return match_nodes(graph, self._shapes[number].graph, similar[0], 0.0, part=True)
+        return match_nodes(graph, self._shapes[number].graph, similarities[0], 0.0, part=True)
 
 
 def _scaled(graph: ShockGraph, scale: float) -> ShockGraph:

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from visup.agent.model.errors import DatabaseError
 from visup.percepts.shape.database.file_format import (
-    MOST_BYTES,
-    MOST_NAME,
+    LARGEST_ROW_BYTES,
+    LONGEST_NAME,
     TaughtRow,
     damaged,
 )
@@ -38,10 +38,10 @@ def checked_name(name: str) -> str:
         DatabaseError: The name is not valid.
     """
     bare = name.strip()
-    if not 0 < len(bare) <= MOST_NAME or not bare.isprintable():
+    if not 0 < len(bare) <= LONGEST_NAME or not bare.isprintable():
         raise DatabaseError(
             f"a taught thing cannot be called {bare[:40]!r}",
-            expected=f"1 to {MOST_NAME} printable characters",
+            expected=f"1 to {LONGEST_NAME} printable characters",
         )
     return bare
 
@@ -60,10 +60,10 @@ def encoded(view: TaughtView) -> TaughtRow:
         *(cv2.imencode(".png", p)[1].tobytes() for p in (view.image, mask, view.scene)),
     )
     size = len(row.image) + len(row.mask) + len(row.scene)
-    if size > MOST_BYTES - (1 << 16) or view.mask.size > MOST_PIXELS:
+    if size > LARGEST_ROW_BYTES - (1 << 16) or view.mask.size > MOST_PIXELS:
         raise DatabaseError(
             f"the picture of '{name}' is too large to be stored ({size / 1e6:.0f} MB)",
-            expected=f"at most {MOST_BYTES / 1e6:.0f} MB and {MOST_PIXELS} pixels",
+            expected=f"at most {LARGEST_ROW_BYTES / 1e6:.0f} MB and {MOST_PIXELS} pixels",
             hint="show it in a picture of fewer pixels",
         )
     return row
@@ -76,7 +76,7 @@ def decoded(path: Path, number: int, row: TaughtRow) -> TaughtView:
         DatabaseError: The row holds no valid view.
     """
     try:
-        image, scene = _colours(row.image), _colours(row.scene)
+        image, scene = _decode_colour(row.image), _decode_colour(row.scene)
         mask = _decode(row.mask, cv2.IMREAD_GRAYSCALE) > 127
         _check(row, image, mask, scene)
     except InvalidRecordError as e:
@@ -91,7 +91,7 @@ def decoded(path: Path, number: int, row: TaughtRow) -> TaughtView:
     )
 
 
-def _colours(data: bytes) -> NDArray[np.uint8]:
+def _decode_colour(data: bytes) -> NDArray[np.uint8]:
     return _decode(data, cv2.IMREAD_COLOR)
 
 
@@ -115,7 +115,7 @@ def _check(
     row: TaughtRow, image: NDArray[np.uint8], mask: NDArray[np.bool_], scene: NDArray[np.uint8]
 ) -> None:
     x, y, width, height = row.place
-    for sound, what in (
+    for valid, what in (
         (image.shape[:2] == mask.shape, "an outline of another size than its picture"),
         (min(x, y) >= 0, "a place outside its picture"),
         (x + mask.shape[1] <= width, "a place outside its picture"),
@@ -123,7 +123,7 @@ def _check(
         (np.count_nonzero(mask) >= LEAST_PIXELS, "nothing in its outline"),
         (scene.shape[1] <= SCENE_WIDTH, "a scene that is too wide"),
     ):
-        if not sound:
+        if not valid:
             raise InvalidRecordError(what)
 
 
@@ -139,12 +139,12 @@ def read_taught(file: sqlite3.Connection) -> tuple[TaughtRow, ...]:
         name, *place, image, mask, scene = columns
         if number != expected:
             raise InvalidRecordError(f"taught view {expected + 1} is missing")
-        if not isinstance(name, str) or not 0 < len(name) <= MOST_NAME:
+        if not isinstance(name, str) or not 0 < len(name) <= LONGEST_NAME:
             raise InvalidRecordError(f"taught view {number + 1} without a name")
-        sound = all(isinstance(p, bytes) for p in (image, mask, scene))
-        sound &= all(isinstance(n, int) and abs(n) < 1 << 20 for n in place)
+        valid = all(isinstance(p, bytes) for p in (image, mask, scene))
+        valid &= all(isinstance(n, int) and abs(n) < 1 << 20 for n in place)
         row = TaughtRow(name, tuple(place), image, mask, scene)
-        if not sound or crc != row.checksum(number):
+        if not valid or crc != row.checksum(number):
             raise InvalidRecordError(f"a wrong check sum of taught view {number + 1}")
         rows.append(row)
     return tuple(rows)

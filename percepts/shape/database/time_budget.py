@@ -31,5 +31,5 @@ def share_within(milliseconds: float, views: int) -> float:
         >>> share_within(12.0, 1000), share_within(0.0, 1000)
         (0.02, 0.001)
     """
-    left = milliseconds - SHAPE_MS - SEARCH_MS
-    return max(1.0, left / VIEW_MS) / max(1, views)
+    comparison_ms = milliseconds - SHAPE_MS - SEARCH_MS
+    return max(1.0, comparison_ms / VIEW_MS) / max(1, views)

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from visup.percepts.shape.index.view_records import Direction, NewView
 from visup.percepts.shape.silhouette.silhouette import resample_closed
 
-ALIKE = 0.005
+SAME_OUTLINE_DISTANCE = 0.005
 """Distance of outlines below which two views are merged, in square roots of their area."""
 
-ALIKE_AREA = 0.01
+SAME_AREA_DIFFERENCE = 0.01
 """Largest relative difference of their areas: a model's size is the same from all sides."""
 
 _POINTS = 384
@@ -33,22 +33,24 @@ def merge_symmetric(views: Sequence[NewView]) -> list[NewView]:
             stay as they are.
 
     Returns:
-        The remaining views, in order; `also` holds the directions of those merged into them.
+        The remaining views, in order; `further_directions` holds the directions of those merged into them.
     """
     waves = [frequencies(v.shape.contour) for v in views]
     areas = np.array([v.area or np.nan for v in views])
     retained: list[int] = []
-    also: dict[int, tuple[Direction, ...]] = {}
+    further_directions: dict[int, tuple[Direction, ...]] = {}
     for k, view in enumerate(views):
-        first = None if view.direction is None else _first_match(k, retained, waves, areas)
-        if first is None or view.direction is None:
+        match = None if view.direction is None else _first_match(k, retained, waves, areas)
+        if match is None or view.direction is None:
             retained.append(k)
             continue
-        number, mirrored = first
+        number, mirrored = match
         x, y, z = view.direction
-        seen = (-x, -y, -z) if mirrored else view.direction
-        also[number] = (*also.get(number, ()), seen)
-    return [replace(views[k], also=(*views[k].also, *also.get(k, ()))) for k in retained]
+        direction = (-x, -y, -z) if mirrored else view.direction
+        further_directions[number] = (*further_directions.get(number, ()), direction)
+    return [
+        replace(views[k], also=(*views[k].also, *further_directions.get(k, ()))) for k in retained
+    ]
 
 
 def frequencies(contour: NDArray[np.floating]) -> NDArray[np.complex128]:
@@ -64,11 +66,11 @@ def _first_match(
     areas: NDArray[np.float64],
 ) -> tuple[int, bool] | None:
     """The first retained view that this one matches, and whether mirrored."""
-    near = np.abs(areas[list(retained)] / areas[number] - 1) < ALIKE_AREA
+    near = np.abs(areas[list(retained)] / areas[number] - 1) < SAME_AREA_DIFFERENCE
     for k in np.flatnonzero(near):
         other = retained[int(k)]
         straight, mirror = outline_gap(waves[number], waves[other])
-        if min(straight, mirror) < ALIKE:
+        if min(straight, mirror) < SAME_OUTLINE_DISTANCE:
             return other, mirror < straight
     return None
 
@@ -88,9 +90,9 @@ def outline_gap(one: NDArray[np.complex128], other: NDArray[np.complex128]) -> t
     energy = float((np.abs(one) ** 2).sum() + (np.abs(other) ** 2).sum()) / size
     # A mirrored outline runs backwards: conjugate points in opposite order.
     gaps = []
-    for theirs in (other, np.conj(other)):
-        alike = np.abs(np.fft.ifft(np.conj(one) * theirs)).max()
-        gaps.append(float(np.sqrt(max(0.0, energy - 2 * alike) / size)))
+    for candidate in (other, np.conj(other)):
+        correlation = np.abs(np.fft.ifft(np.conj(one) * candidate)).max()
+        gaps.append(float(np.sqrt(max(0.0, energy - 2 * correlation) / size)))
     return gaps[0], gaps[1]
 
 
@@ -128,12 +130,12 @@ def _hull_edges(points: NDArray[np.float64]) -> list[tuple[int, int]]:
     """Edges of the convex hull; all pairs when the points span no solid."""
     from scipy.spatial import ConvexHull, QhullError
 
-    every = [(a, b) for a in range(len(points)) for b in range(a)]
+    all_pairs = [(a, b) for a in range(len(points)) for b in range(a)]
     if len(points) < 5 or np.linalg.matrix_rank(points, tol=1e-6) < 3:
-        return every
+        return all_pairs
     try:
         corners = np.asarray(ConvexHull(points).simplices)
     except QhullError:
-        return every
+        return all_pairs
     sides = np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [0, 2]]]))
     return [(int(a), int(b)) for a, b in np.unique(sides, axis=0)]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.percepts.shape.database.model_database import ModelDatabase
-from visup.percepts.shape.drawing.pictures import draw_graph, draw_shape, placed
+from visup.percepts.shape.drawing.pictures import draw_graph, draw_shape, placement
 from visup.percepts.shape.drawing.sheet import PALE, RULE, Sheet, legend
 from visup.percepts.shape.index.view_records import ModelView
 from visup.percepts.taught.drawing_views import view_tile
@@ -49,20 +49,22 @@ def contact_sheet(database: ModelDatabase, names: Sequence[str] | None = None) -
 
 
 def _draw_row(sheet: Sheet, database: ModelDatabase, name: str, top: float) -> None:
-    own = database.views.named({name}).tolist()
+    views_of_model = database.views.named({name}).tolist()
     taught = [view for view in database.taught if view.name == name]
     sheet.line([(0, top), (sheet.size[0], top)], RULE)
     sheet.fitted((_MARGIN, top + 32), name, _LABEL - _MARGIN - 8, 14)
-    for k, line in enumerate(_counts([database.views[k] for k in own], len(taught))):
+    for k, line in enumerate(_counts([database.views[k] for k in views_of_model], len(taught))):
         sheet.text((_MARGIN, top + 50 + 15 * k), line, 12, PALE)
-    photos = _spread(taught, _PHOTOS_SHOWN if own else _VIEWS_SHOWN)
+    photos = _evenly_selected(taught, _PHOTOS_SHOWN if views_of_model else _VIEWS_SHOWN)
     for column, photo in enumerate(photos):
         corner = (_LABEL + column * TILE + 4, top + 4)
         sheet.photo(corner, view_tile(photo, 2 * TILE), TILE - 8)
-    for column, view in enumerate(_spread(own, _VIEWS_SHOWN - len(photos)), start=len(photos)):
+    for column, view in enumerate(
+        _evenly_selected(views_of_model, _VIEWS_SHOWN - len(photos)), start=len(photos)
+    ):
         shape = database.shapes[view]
         centre = (_LABEL + (column + 0.5) * TILE, top + TILE / 2)
-        place = placed(shape.contour, centre, TILE - 16)
+        place = placement(shape.contour, centre, TILE - 16)
         draw_shape(sheet, shape.contour, place)
         draw_graph(sheet, shape.graph, place)
 
@@ -79,8 +81,8 @@ def _counts(views: Sequence[ModelView], taught: int) -> list[str]:
     return lines
 
 
-def _spread(every: Sequence[Item], most: int) -> list[Item]:
+def _evenly_selected(items: Sequence[Item], most: int) -> list[Item]:
     """At most `most` items, evenly spaced over a sequence."""
-    if len(every) <= most:
-        return list(every)
-    return [every[i * len(every) // most] for i in range(most)]
+    if len(items) <= most:
+        return list(items)
+    return [items[i * len(items) // most] for i in range(most)]

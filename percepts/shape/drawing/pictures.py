@@ -39,7 +39,7 @@ _MARGIN = 18
 Place = Callable[[NDArray[np.floating]], list[Point]]
 
 
-def placed(
+def placement(
     contour: NDArray[np.floating],
     centre: Point,
     side: float,
@@ -121,7 +121,7 @@ def match_picture(
 
 def _draw_query(sheet: Sheet, silhouette: Silhouette, query: Shape, height: int) -> None:
     """The silhouette, its skeleton by kind of shock, and its nodes with their numbers."""
-    place = placed(query.contour, (250, _HEAD + 0.5 * min(height - _HEAD, 500)), 420)
+    place = placement(query.contour, (250, _HEAD + 0.5 * min(height - _HEAD, 500)), 420)
     draw_shape(sheet, query.contour, place)
     for point, kind in _labelled_points(silhouette)[::4]:
         (x, y) = place(point[None])[0]
@@ -186,12 +186,12 @@ def _draw_match(
     top = _HEAD + row * _ROW
     middle = top + _ROW / 2
     sheet.line([(500, top), (1120, top)], RULE)
-    own = _Panel(query, placed(query.contour, (600, middle), 140))
+    own = _Panel(query, placement(query.contour, (600, middle), 140))
     shape = database.shapes[match.view.id - 1]
-    theirs = _Panel(shape, placed(shape.contour, (830, middle), 140, _turn(match)))
-    for panel in (own, theirs):
+    other = _Panel(shape, placement(shape.contour, (830, middle), 140, _turn(match)))
+    for panel in (own, other):
         draw_shape(sheet, panel.shape.contour, panel.place)
-    _draw_pairs(sheet, own, theirs, match)
+    _draw_pairs(sheet, own, other, match)
     x = 928
     sheet.fitted((x, top + 42), f"{row + 1}. {match.view.name}", 180, 15)
     sheet.box((x, top + 52), (x + 170, top + 60), RULE, 4)
@@ -202,12 +202,16 @@ def _draw_match(
 
 def _caption(match: ViewMatch) -> list[str]:
     turn = f"turned by {math.degrees(match.rotation):.0f}°"
-    terms = match.likeness
+    terms = match.terms
+    of_graph, of_outline, of_area = (
+        f"{value:.2f}"
+        for value in (terms.graph_similarity, terms.outline_similarity, terms.area_similarity)
+    )
     return [
         f"similarity {match.similarity:.3f}",
-        f"view {match.view.number}, {turn}" + (", mirrored" if match.likeness.mirrored else ""),
-        f"graph {terms.of_graphs:.2f}, outline {terms.of_outlines:.2f}, area {terms.of_areas:.2f}",
-        f"{len(match.likeness.match.pairs) - 1} corresponding nodes",
+        f"view {match.view.number}, {turn}" + (", mirrored" if terms.mirrored else ""),
+        f"graph {of_graph}, outline {of_outline}, area {of_area}",
+        f"{len(terms.match.pairs) - 1} corresponding nodes",
     ]
 
 
@@ -215,27 +219,27 @@ def _turn(match: ViewMatch) -> NDArray[np.float64]:
     """The transform from the view to the silhouette: mirrored if it is, then rotated."""
     angle = match.rotation
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    return turn @ np.diag([-1.0, 1.0]) if match.likeness.mirrored else turn
+    return turn @ np.diag([-1.0, 1.0]) if match.terms.mirrored else turn
 
 
-def _draw_pairs(sheet: Sheet, own: _Panel, theirs: _Panel, match: ViewMatch) -> None:
+def _draw_pairs(sheet: Sheet, own: _Panel, other: _Panel, match: ViewMatch) -> None:
     """Lines between corresponding nodes, stronger for more similar pairs; other nodes pale."""
-    here = own.place(own.shape.graph.positions)
-    there = theirs.place(theirs.shape.graph.positions)
-    for panel, at in ((own, here), (theirs, there)):
+    own_points = own.place(own.shape.graph.positions)
+    other_points = other.place(other.shape.graph.positions)
+    for panel, at in ((own, own_points), (other, other_points)):
         for node in range(1, len(panel.shape.graph)):
             sheet.dot(at[node], 2.5, (190, 196, 205))
-    for u, v, similar in sorted(match.likeness.match.pairs, key=lambda p: p[2]):
+    for u, v, similar in sorted(match.terms.match.pairs, key=lambda p: p[2]):
         if u == 0:
             continue
         colour = _colour(own.shape.graph, u)
-        sheet.line([here[u], there[v]], _faded(colour, similar), 0.6 + 1.6 * similar)
-    for u, v, _ in match.likeness.match.pairs:
+        sheet.line([own_points[u], other_points[v]], _faded(colour, similar), 0.6 + 1.6 * similar)
+    for u, v, _ in match.terms.match.pairs:
         if u == 0:
             continue
         weight = float(own.shape.graph.weights[u]) ** 0.5
-        sheet.dot(here[u], 3.0 + 3.5 * weight, _colour(own.shape.graph, u))
-        sheet.dot(there[v], 3.0 + 3.5 * weight, _colour(theirs.shape.graph, v))
+        sheet.dot(own_points[u], 3.0 + 3.5 * weight, _colour(own.shape.graph, u))
+        sheet.dot(other_points[v], 3.0 + 3.5 * weight, _colour(other.shape.graph, v))
 
 
 def _faded(colour: Colour, strength: float) -> Colour:

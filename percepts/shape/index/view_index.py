@@ -60,13 +60,13 @@ class Candidates:
     Attributes:
         numbers: (C,) numbers of the views, ascending.
         bounds: (C,) upper bounds of the graphs' similarities.
-        similar: For each view the (N, M) similarities of the query's nodes with the view's.
+        similarities: For each view the (N, M) similarities of the query's nodes with the view's.
         overlaps: Area overlaps of the query with them.
     """
 
     numbers: NDArray[np.intp]
     bounds: NDArray[np.float64]
-    similar: list[NDArray[np.float32]]
+    similarities: list[NDArray[np.float32]]
     overlaps: AreaOverlaps
 
 
@@ -117,7 +117,7 @@ class ViewIndex:
     ) -> None:
         self.weights = weights
         self._shapes = shapes
-        self._given = summaries
+        self._given_summaries = summaries
         self._features: OrderedDict[int, NDArray[np.float32]] = OrderedDict()
 
     def __len__(self) -> int:
@@ -125,7 +125,7 @@ class ViewIndex:
 
     @cached_property
     def _summaries(self) -> ViewSummaries:
-        return self._given or ViewSummaries.of(self._shapes)
+        return self._given_summaries or ViewSummaries.of(self._shapes)
 
     @cached_property
     def _roots(self) -> NDArray[np.float32]:
@@ -156,27 +156,30 @@ class ViewIndex:
         size = len(self) if among is None else len(among)
         if size <= most:
             return np.arange(size) if among is None else among
-        own = _vectors(ViewSummaries.of([query]), slice(None), self.weights)[0]
-        apart = self._apart(own, among)
+        query_vector = _vectors(ViewSummaries.of([query]), slice(None), self.weights)[0]
+        distances = self._squared_distances(query_vector, among)
         if size > (nearest := max(NEAREST, most)):
-            kept = np.argpartition(apart, nearest - 1)[:nearest]
-            kept.sort()
-            among, apart = (kept if among is None else among[kept]), apart[kept]
+            nearest_numbers = np.argpartition(distances, nearest - 1)[:nearest]
+            nearest_numbers.sort()
+            among, distances = (
+                (nearest_numbers if among is None else among[nearest_numbers]),
+                distances[nearest_numbers],
+            )
         among = np.arange(size) if among is None else among
         # The spectrum is dropped: the sketches contain the same information in more detail.
-        features = len(own) - SPECTRUM
-        squares = ((self._roots[among, :features] - own[:features]) ** 2).sum(axis=1)
+        features = len(query_vector) - SPECTRUM
+        squares = ((self._roots[among, :features] - query_vector[:features]) ** 2).sum(axis=1)
         outlines = sketch_distances(sketch(query.heights), self._summaries.sketches[among])
-        uncovered = 1.0 - self._covered(query, among)
-        apart = (
+        uncovered_share = 1.0 - self._area_similarities(query, among)
+        distances = (
             outlines / _SKETCH_SCALE
             + _ROOT_SHARE * np.sqrt(squares)
-            + _AREA_SHARE * np.sqrt(uncovered / _AREA_SCALE)
+            + _AREA_SHARE * np.sqrt(uncovered_share / _AREA_SCALE)
         )
-        order = among[np.argsort(apart, kind="stable")]
-        return np.sort(_spread(order, self._summaries.models[order], most))
+        order = among[np.argsort(distances, kind="stable")]
+        return np.sort(_with_every_model(order, self._summaries.models[order], most))
 
-    def _apart(
+    def _squared_distances(
         self, own: NDArray[np.float32], among: NDArray[np.intp] | None
     ) -> NDArray[np.float32]:
         """Squared distances from views' vectors, without the constant term of the query."""
@@ -189,7 +192,7 @@ class ViewIndex:
         query: Shape,
         among: NDArray[np.intp] | None,
         most: int,
-        favoured: NDArray[np.intp] | None = None,
+        always_included: NDArray[np.intp] | None = None,
     ) -> Candidates:
         """The views that are worth a full comparison.
 
@@ -197,11 +200,11 @@ class ViewIndex:
             query: A shape.
             among: Numbers of views, ascending; all views when None.
             most: How many to return.
-            favoured: Numbers of views of which as many are added, whatever the others.
+            always_included: Numbers of views; the likeliest of these are added, as many again.
         """
         numbers = self.likeliest(query, among, most)
-        if favoured is not None and len(favoured):
-            extra = self.likeliest(query, favoured, most)
+        if always_included is not None and len(always_included):
+            extra = self.likeliest(query, always_included, most)
             numbers = np.union1d(numbers, extra).astype(np.intp)
         bounds, similar = self.bounds(query.graph, numbers)
         return Candidates(numbers, bounds, similar, self.overlaps(query, numbers))
@@ -212,7 +215,7 @@ class ViewIndex:
             return self._areas.overlaps(query.areas, among)
         return area_overlaps(query.areas, self._summaries.areas[among])
 
-    def _covered(self, query: Shape, among: NDArray[np.intp]) -> NDArray[np.float64]:
+    def _area_similarities(self, query: Shape, among: NDArray[np.intp]) -> NDArray[np.float64]:
         """Best area similarity of a shape with each of some views, mirrored or not, (V,)."""
         if len(self) <= CACHED:
             similar = self._areas.similarities(query.areas, among)
@@ -220,10 +223,13 @@ class ViewIndex:
             similar = AreaIndex(self._summaries.areas[among]).similarities(query.areas)
         return np.asarray(similar.max(axis=1))
 
-    def best_covered(self, query: Shape, among: NDArray[np.intp], most: int) -> NDArray[np.intp]:
+    def best_overlapping(
+        self, query: Shape, among: NDArray[np.intp], most: int
+    ) -> NDArray[np.intp]:
         """The views of best area overlap with a shape: at most `most` of the numbers, ascending."""
         covered = [
-            self._covered(query, among[k : k + CACHED]) for k in range(0, len(among), CACHED)
+            self._area_similarities(query, among[k : k + CACHED])
+            for k in range(0, len(among), CACHED)
         ]
         return np.sort(among[np.argsort(-np.concatenate(covered), kind="stable")[:most]])
 
@@ -251,29 +257,29 @@ class ViewIndex:
         sizes = np.array([len(f) for f in features])
         starts = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.intp)
         shares = np.concatenate([self._shapes[int(k)].graph.weights for k in among])
-        similar = node_similarities(embed(query, self.weights), np.concatenate(features))
-        roots = similar[0, starts].astype(np.float64)
-        inner = similar[1:].copy()
+        similarities = node_similarities(embed(query, self.weights), np.concatenate(features))
+        roots = similarities[0, starts].astype(np.float64)
+        inner = similarities[1:].copy()
         inner[:, starts] = 0.0
-        forth = query.weights[1:] @ np.maximum.reduceat(inner, starts, axis=1)
-        back = np.add.reduceat(inner.max(axis=0) * shares, starts)
-        nodes = forth if part else 0.5 * (forth + back)
+        forward = query.weights[1:] @ np.maximum.reduceat(inner, starts, axis=1)
+        backward = np.add.reduceat(inner.max(axis=0) * shares, starts)
+        nodes = forward if part else 0.5 * (forward + backward)
         bounds = self.weights.root * roots + (1 - self.weights.root) * nodes
         ends = np.append(starts[1:], len(shares)).tolist()
-        return bounds, [similar[:, a:b] for a, b in zip(starts.tolist(), ends, strict=True)]
+        return bounds, [similarities[:, a:b] for a, b in zip(starts.tolist(), ends, strict=True)]
 
     def _nodes(self, view: int) -> NDArray[np.float32]:
         """Features of a view's nodes, cached."""
-        kept = self._features.get(view)
-        if kept is None:
-            kept = embed(self._shapes[view].graph, self.weights)
-            self._features[view] = kept
+        cached = self._features.get(view)
+        if cached is None:
+            cached = embed(self._shapes[view].graph, self.weights)
+            self._features[view] = cached
             if len(self._features) > CACHED:
                 self._features.popitem(last=False)
-        return kept
+        return cached
 
 
-def _spread(
+def _with_every_model(
     order: NDArray[np.intp], models: NDArray[np.integer[Any]], most: int
 ) -> NDArray[np.intp]:
     """The first `most` of an order; a quarter of the places goes to models without one."""

@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from visup.compiled import compiled
 from visup.percepts.shape.silhouette._height_functions_jit import (
-    aligned,
+    alignment_cost,
     complexity,
     heights_along,
     point_costs,
-    turned_over,
+    transposed_heights,
 )
 
 Doubles = NDArray[np.float64]
@@ -21,7 +21,7 @@ ON_LINE = 0.03
 
 
 @compiled
-def kept_part(contour: Doubles, cos: float, sin: float, offset: float, out: Doubles) -> int:
+def clip_by_line(contour: Doubles, cos: float, sin: float, offset: float, out: Doubles) -> int:
     """Clip an outline by a line and rotate it so that the line is on the right.
 
     Args:
@@ -50,7 +50,7 @@ def kept_part(contour: Doubles, cos: float, sin: float, offset: float, out: Doub
 
 
 @compiled
-def normal_form(points: Doubles, mirror: bool) -> None:
+def normalise_polygon(points: Doubles, mirror: bool) -> None:
     """Centre a polygon (N, 2), scale it to unit area and optionally mirror it top to bottom, in place."""
     count, double, x, y = len(points), 0.0, 0.0, 0.0
     for i in range(count):
@@ -75,7 +75,7 @@ def normal_form(points: Doubles, mirror: bool) -> None:
 
 
 @compiled
-def evenly(points: Doubles, out: Doubles) -> None:
+def resample_evenly(points: Doubles, out: Doubles) -> None:
     """Resample a polygon (N, 2) evenly into (P, 2), from the lower end of its right edge."""
     count, wanted = len(points), len(out)
     right = points[:, 0].max()
@@ -102,7 +102,9 @@ def evenly(points: Doubles, out: Doubles) -> None:
 
 
 @compiled
-def framed(contour: Doubles, line: Doubles, mirror: bool, scratch: Doubles, out: Doubles) -> None:
+def to_common_frame(
+    contour: Doubles, line: Doubles, mirror: bool, scratch: Doubles, out: Doubles
+) -> None:
     """A cut outline in normal form, with the line on the right, starting at its lower end.
 
     Args:
@@ -112,11 +114,11 @@ def framed(contour: Doubles, line: Doubles, mirror: bool, scratch: Doubles, out:
         scratch: (2 N, 2) at least.
         out: (P, 2).
     """
-    remaining = kept_part(contour, line[0], line[1], line[2], scratch)
+    remaining = clip_by_line(contour, line[0], line[1], line[2], scratch)
     if remaining < 3:
-        remaining = kept_part(contour, line[0], line[1], np.inf, scratch)
-    normal_form(scratch[:remaining], mirror)
-    evenly(scratch[:remaining], out)
+        remaining = clip_by_line(contour, line[0], line[1], np.inf, scratch)
+    normalise_polygon(scratch[:remaining], mirror)
+    resample_evenly(scratch[:remaining], out)
 
 
 @compiled
@@ -130,7 +132,7 @@ def compare_cut(
     """Compare a cut silhouette with views cut likewise, in a common frame, without a rotation search.
 
     Args:
-        own: (P, H) heights of the silhouette's outline as `framed`.
+        own: (P, H) heights of the silhouette's outline as `to_common_frame`.
         contours: Concatenated points of all views (M, 2), and the start of each and the end of the last.
         lines: (K, 4) cosine, sine, offset, and 1 for mirrored.
         alignment: Stretches of heights, band, and price of a sideways step.
@@ -145,9 +147,9 @@ def compare_cut(
     scratch = np.empty((2 * len(points) + 2, 2))
     for k in range(len(lines)):
         contour = points[starts[k] : starts[k + 1]]
-        framed(contour, lines[k], lines[k, 3] > 0.0, scratch, outline)
+        to_common_frame(contour, lines[k], lines[k, 3] > 0.0, scratch, outline)
         heights_along(outline, stops, heights)
-        turned_over(heights, False, other)
+        transposed_heights(heights, False, other)
         point_costs(own, other, costs)
-        out[k, 0] = aligned(costs, 0, band, skip, lanes)
+        out[k, 0] = alignment_cost(costs, 0, band, skip, lanes)
         out[k, 1] = complexity(heights)

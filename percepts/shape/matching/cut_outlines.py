@@ -12,15 +12,15 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.shape.matching._cut_outlines_jit import compare_cut, framed
+from visup.percepts.shape.matching._cut_outlines_jit import compare_cut, to_common_frame
 from visup.percepts.shape.matching.shape_similarity import OUTLINE_SCALE
 from visup.percepts.shape.silhouette._height_functions_jit import complexity, heights_along
 from visup.percepts.shape.silhouette.height_functions import (
     BAND,
-    BETA,
+    COMPLEXITY_OFFSET,
     HEIGHTS,
     POINTS,
-    SKIP,
+    SKIP_COST,
     stretches,
 )
 
@@ -45,7 +45,7 @@ def compare_cut_outlines(
     """
     if not len(views):
         return np.empty(0)
-    outline = framed_outline(contour, border)
+    outline = outline_in_common_frame(contour, border)
     heights = np.empty((POINTS, HEIGHTS), np.float32)
     heights_along(outline, stretches(), heights)
     bearings, offsets, mirrored = lines.T
@@ -53,12 +53,12 @@ def compare_cut_outlines(
     points = np.concatenate([np.asarray(v, dtype=np.float64) for v in views])
     starts = np.concatenate([[0], np.cumsum([len(v) for v in views])]).astype(np.intp)
     out = np.empty((len(views), 2))
-    compare_cut(heights, (points, starts), rows, (stretches(), BAND, SKIP), out)
-    distance = out[:, 0] / (BETA + complexity(heights) + out[:, 1])
+    compare_cut(heights, (points, starts), rows, (stretches(), BAND, SKIP_COST), out)
+    distance = out[:, 0] / (COMPLEXITY_OFFSET + complexity(heights) + out[:, 1])
     return np.asarray(np.exp(-((distance / OUTLINE_SCALE) ** 2)))
 
 
-def framed_outline(
+def outline_in_common_frame(
     contour: NDArray[np.floating],
     bearing: float,
     offset: float = np.inf,
@@ -79,5 +79,5 @@ def framed_outline(
     """
     points = np.array(contour, dtype=np.float64)
     line, out = np.array([np.cos(bearing), np.sin(bearing), offset]), np.empty((POINTS, 2))
-    framed(points, line, mirrored, np.empty((2 * len(points) + 2, 2)), out)
+    to_common_frame(points, line, mirrored, np.empty((2 * len(points) + 2, 2)), out)
     return out

@@ -29,7 +29,7 @@ def similarity_matrix(shapes: Sequence[Shape]) -> NDArray[np.float64]:
             shape, shapes[:i], index.overlaps(shape.areas, np.arange(i))
         )
         graphs = np.array([match_graphs(shape.graph, o.graph).similarity for o in shapes[:i]])
-        out[i, :i] = out[:i, i] = GRAPH_SHARE * graphs + comparison.worth
+        out[i, :i] = out[:i, i] = GRAPH_SHARE * graphs + comparison.partial_similarity
     return out
 
 
@@ -54,18 +54,18 @@ def medoids(similarity: NDArray[np.float64], count: int) -> list[int]:
     chosen: list[int] = []
     while len(chosen) < count:
         rest = [k for k in range(size) if k not in chosen]
-        chosen.append(max(rest, key=lambda k: (_covered(similarity, [*chosen, k]), -k)))
-    return sorted(_improve(similarity, chosen))
+        chosen.append(max(rest, key=lambda k: (_coverage(similarity, [*chosen, k]), -k)))
+    return sorted(_improved_by_swaps(similarity, chosen))
 
 
-def _covered(similarity: NDArray[np.float64], chosen: list[int]) -> float:
+def _coverage(similarity: NDArray[np.float64], chosen: list[int]) -> float:
     """Quality of the representation of all members: the sum of similarities to the nearest exemplar."""
     return float(similarity[:, chosen].max(axis=1).sum())
 
 
-def _improve(similarity: NDArray[np.float64], chosen: list[int]) -> list[int]:
+def _improved_by_swaps(similarity: NDArray[np.float64], chosen: list[int]) -> list[int]:
     """Swap an exemplar for a better one until no swap helps; at most 20 rounds."""
-    best = _covered(similarity, chosen)
+    best = _coverage(similarity, chosen)
     for _ in range(20):
         swaps = [
             [*chosen[:i], k, *chosen[i + 1 :]]
@@ -73,8 +73,8 @@ def _improve(similarity: NDArray[np.float64], chosen: list[int]) -> list[int]:
             for k in range(len(similarity))
             if k not in chosen
         ]
-        trial = max(swaps, key=lambda s: _covered(similarity, s), default=chosen)
-        value = _covered(similarity, trial)
+        trial = max(swaps, key=lambda s: _coverage(similarity, s), default=chosen)
+        value = _coverage(similarity, trial)
         if value <= best + 1e-9:
             return chosen
         chosen, best = trial, value

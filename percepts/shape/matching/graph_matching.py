@@ -21,7 +21,7 @@ from scipy.optimize import linear_sum_assignment
 
 from visup.percepts.shape.shocks.shock_graph import ShockGraph
 
-BREAK = 0.9
+HIERARCHY_PENALTY = 0.9
 """Factor of a pair's value for each better pair whose hierarchy it contradicts."""
 
 
@@ -61,7 +61,7 @@ class GraphMatch:
     similarity: float
     pairs: tuple[tuple[int, int, float], ...]
 
-    def turned(self) -> GraphMatch:
+    def swapped(self) -> GraphMatch:
         """The same match with the graphs exchanged."""
         return GraphMatch(self.similarity, tuple((v, u, s) for u, v, s in self.pairs))
 
@@ -99,15 +99,15 @@ def match_graphs(a: ShockGraph, b: ShockGraph, weights: MatchWeights = WEIGHTS) 
         The similarity, which is symmetric, and the corresponding nodes.
     """
     if b.key < a.key:
-        return match_graphs(b, a, weights).turned()
-    similar = node_similarities(embed(a, weights), embed(b, weights))
-    return match_nodes(a, b, similar, weights.root)
+        return match_graphs(b, a, weights).swapped()
+    similarities = node_similarities(embed(a, weights), embed(b, weights))
+    return match_nodes(a, b, similarities, weights.root)
 
 
 def match_nodes(
     a: ShockGraph,
     b: ShockGraph,
-    similar: NDArray[np.float32],
+    similarities: NDArray[np.float32],
     root: float,
     *,
     part: bool = False,
@@ -117,7 +117,7 @@ def match_nodes(
     Args:
         a: The first graph, N nodes.
         b: The second graph, M nodes.
-        similar: (N, M), similarity of each pair of nodes.
+        similarities: (N, M), similarity of each pair of nodes.
         root: Share of the root in the similarity.
         part: Whether the first is a part only; nodes of the second without a partner then cost nothing.
 
@@ -125,37 +125,39 @@ def match_nodes(
         The match. Each pair counts by the mean of its two nodes' shares of the area, or by the first's
         when it is a part.
     """
-    theirs = a.weights[:, None] if part else b.weights[None]
-    shares = 0.5 * (a.weights[:, None] + theirs) * similar
-    pairs = correspond(a.below, b.below, shares)
-    whole = float(similar[0, 0])
-    total = sum(worth for _, _, worth in pairs)
-    found = ((0, 0, whole), *((u, v, float(similar[u, v])) for u, v, _ in pairs))
-    return GraphMatch(min(1.0, root * whole + (1 - root) * total), found)
+    weights_b = a.weights[:, None] if part else b.weights[None]
+    shares = 0.5 * (a.weights[:, None] + weights_b) * similarities
+    pairs = corresponding_nodes(a.below, b.below, shares)
+    root_similarity = float(similarities[0, 0])
+    total = sum(value for _, _, value in pairs)
+    found = ((0, 0, root_similarity), *((u, v, float(similarities[u, v])) for u, v, _ in pairs))
+    return GraphMatch(min(1.0, root * root_similarity + (1 - root) * total), found)
 
 
-def match_ceiling(a: ShockGraph, b: ShockGraph, similar: NDArray[np.float32], root: float) -> float:
+def match_upper_bound(
+    a: ShockGraph, b: ShockGraph, similarities: NDArray[np.float32], root: float
+) -> float:
     """An upper bound of `match_nodes`: the best matching, ignoring hierarchy.
 
     Args:
         a: The first graph, N nodes.
         b: The second graph, M nodes.
-        similar: (N, M), similarity of each pair of nodes.
+        similarities: (N, M), similarity of each pair of nodes.
         root: Share of the root in the similarity.
     """
-    worth = (0.5 * (a.weights[:, None] + b.weights[None]) * similar)[1:, 1:]
-    rows, columns = linear_sum_assignment(worth, maximize=True)
-    return float(root * similar[0, 0] + (1 - root) * worth[rows, columns].sum())
+    values = (0.5 * (a.weights[:, None] + b.weights[None]) * similarities)[1:, 1:]
+    rows, columns = linear_sum_assignment(values, maximize=True)
+    return float(root * similarities[0, 0] + (1 - root) * values[rows, columns].sum())
 
 
-def correspond(
+def corresponding_nodes(
     below_a: NDArray[np.bool_], below_b: NDArray[np.bool_], value: NDArray[np.floating]
 ) -> list[tuple[int, int, float]]:
     """Corresponding nodes by recursive bipartite matching; roots (node 0) are left out.
 
     The best pair of a best matching is accepted; every pair that contradicts it, with one node below its
-    node and the other not, is from then on worth `BREAK` of its value; and so on with the rest. The
-    matching is solved again only when one of its pairs lost value: the rest of a best matching whose
+    node and the other not, is from then on worth `HIERARCHY_PENALTY` of its value; and so on with the rest.
+    The matching is solved again only when one of its pairs lost value: the rest of a best matching whose
     pairs keep their value is a best matching of the rest.
 
     Args:
@@ -166,22 +168,22 @@ def correspond(
     Returns:
         Pairs of nodes with their final values, in the order found.
     """
-    left = np.array(value, dtype=np.float64)[1:, 1:]
-    rows, columns = linear_sum_assignment(left, maximize=True)
+    values = np.array(value, dtype=np.float64)[1:, 1:]
+    rows, columns = linear_sum_assignment(values, maximize=True)
     pairs: list[tuple[int, int, float]] = []
     while len(rows):
-        worth = left[rows, columns]
-        best = int(np.argmax(worth))
+        pair_values = values[rows, columns]
+        best = int(np.argmax(pair_values))
         u, v = int(rows[best]) + 1, int(columns[best]) + 1
-        if worth[best] <= 0.0:
+        if pair_values[best] <= 0.0:
             break
-        pairs.append((u, v, float(worth[best])))
-        broken = below_a[u, 1:, None] != below_b[v, None, 1:]
-        broken |= below_a[1:, u, None] != below_b[None, 1:, v]
-        left[broken] *= BREAK
-        left[u - 1, :] = left[:, v - 1] = 0.0
+        pairs.append((u, v, float(pair_values[best])))
+        contradicts = below_a[u, 1:, None] != below_b[v, None, 1:]
+        contradicts |= below_a[1:, u, None] != below_b[None, 1:, v]
+        values[contradicts] *= HIERARCHY_PENALTY
+        values[u - 1, :] = values[:, v - 1] = 0.0
         others = np.arange(len(rows)) != best
         rows, columns = rows[others], columns[others]
-        if broken[rows, columns].any():
-            rows, columns = linear_sum_assignment(left, maximize=True)
+        if contradicts[rows, columns].any():
+            rows, columns = linear_sum_assignment(values, maximize=True)
     return pairs

@@ -66,14 +66,14 @@ class Shape:
 
 
 @dataclass(frozen=True, slots=True)
-class Likeness:
+class ShapeSimilarity:
     """The similarity of two shapes and its terms.
 
     Attributes:
         similarity: 0 to 1; 1 for equal shapes.
-        of_graphs: Similarity of the shock graphs alone.
-        of_outlines: Similarity of the outlines alone.
-        of_areas: Similarity of the areas alone.
+        graph_similarity: Similarity of the shock graphs alone.
+        outline_similarity: Similarity of the outlines alone.
+        area_similarity: Similarity of the areas alone.
         match: Corresponding nodes.
         mirrored: Whether the mirror image of the second matches the first.
         rotation: Radians from x towards y (clockwise in the image) that take the second, first mirrored left
@@ -81,9 +81,9 @@ class Likeness:
     """
 
     similarity: float
-    of_graphs: float
-    of_outlines: float
-    of_areas: float
+    graph_similarity: float
+    outline_similarity: float
+    area_similarity: float
     match: GraphMatch
     mirrored: bool = False
     rotation: float = 0.0
@@ -94,33 +94,37 @@ class OutlineAreaSimilarities:
     """Similarities of one shape with others without their graphs, each as it is or mirrored.
 
     Attributes:
-        of_outlines: (B,) in [0, 1].
-        of_areas: (B,) in [0, 1].
+        outline_similarity: (B,) in [0, 1].
+        area_similarity: (B,) in [0, 1].
         mirrored: (B,) bool.
-        rotation: (B,) radians, as in `Likeness`.
+        rotation: (B,) radians, as in `ShapeSimilarity`.
         shares: (B, 3) shares of graph, outline and area in the similarity.
     """
 
-    of_outlines: NDArray[np.float64]
-    of_areas: NDArray[np.float64]
+    outline_similarity: NDArray[np.float64]
+    area_similarity: NDArray[np.float64]
     mirrored: NDArray[np.bool_]
     rotation: NDArray[np.float64]
     shares: NDArray[np.float64]
 
     @property
-    def worth(self) -> NDArray[np.float64]:
+    def partial_similarity(self) -> NDArray[np.float64]:
         """(B,) contribution of outlines and areas to the similarity; the graph gives the rest."""
-        return self.shares[:, 1] * self.of_outlines + self.shares[:, 2] * self.of_areas
+        return (
+            self.shares[:, 1] * self.outline_similarity + self.shares[:, 2] * self.area_similarity
+        )
 
-    def joined(self, number: int, graphs: GraphMatch) -> Likeness:
+    def with_graph(self, number: int, graphs: GraphMatch) -> ShapeSimilarity:
         """The similarity with one of the others, given the match of its graph."""
-        similarity = float(self.shares[number, 0] * graphs.similarity + self.worth[number])
+        similarity = float(
+            self.shares[number, 0] * graphs.similarity + self.partial_similarity[number]
+        )
         # Features are in single precision: rounded, so that equal shapes give exactly 1.
-        return Likeness(
+        return ShapeSimilarity(
             min(1.0, round(similarity, 5)),
             graphs.similarity,
-            float(self.of_outlines[number]),
-            float(self.of_areas[number]),
+            float(self.outline_similarity[number]),
+            float(self.area_similarity[number]),
             graphs,
             bool(self.mirrored[number]),
             float(self.rotation[number]),
@@ -133,7 +137,9 @@ def shape_of(silhouette: Silhouette) -> Shape:
     return Shape(silhouette.contour, graph, silhouette.areas, silhouette.cut, silhouette.border)
 
 
-def compare_shapes(a: Shape, b: Shape, *, mirror: bool = True, rigid: bool = False) -> Likeness:
+def compare_shapes(
+    a: Shape, b: Shape, *, mirror: bool = True, rigid: bool = False
+) -> ShapeSimilarity:
     """Compare two shapes; the similarity is symmetric.
 
     Args:
@@ -155,7 +161,7 @@ def compare_shapes(a: Shape, b: Shape, *, mirror: bool = True, rigid: bool = Fal
     comparison = compare_outlines_and_areas(
         a, [b], overlaps, mirror=mirror, rigid=np.array([rigid])
     )
-    return comparison.joined(0, match_graphs(a.graph, b.graph))
+    return comparison.with_graph(0, match_graphs(a.graph, b.graph))
 
 
 def compare_outlines_and_areas(
@@ -178,11 +184,15 @@ def compare_outlines_and_areas(
     outlines, areas = _outline_similarities(query, others), overlaps.similarity**AREA_POWER
     is_rigid = np.zeros(len(others), dtype=bool) if rigid is None else rigid
     shares = np.where(is_rigid[:, None], RIGID_SHARES, KIND_SHARES)
-    worth = shares[:, 1:2] * outlines + shares[:, 2:] * areas
-    mirrored = (worth[:, 1] > worth[:, 0]) & mirror
-    each, side = np.arange(len(others)), mirrored.astype(np.intp)
+    partial_similarity = shares[:, 1:2] * outlines + shares[:, 2:] * areas
+    mirrored = (partial_similarity[:, 1] > partial_similarity[:, 0]) & mirror
+    numbers, side = np.arange(len(others)), mirrored.astype(np.intp)
     return OutlineAreaSimilarities(
-        outlines[each, side], areas[each, side], mirrored, overlaps.rotation[each, side], shares
+        outlines[numbers, side],
+        areas[numbers, side],
+        mirrored,
+        overlaps.rotation[numbers, side],
+        shares,
     )
 
 
@@ -194,7 +204,9 @@ def _outline_similarities(query: Shape, others: Sequence[Shape]) -> NDArray[np.f
     if not others:
         return np.empty((0, 2))
     heights = np.stack([o.heights for o in others])
-    own = np.broadcast_to(query.heights, heights.shape)
-    first = np.array([query.graph.key <= o.graph.key for o in others])[:, None, None]
-    distance = outline_distances(np.where(first, own, heights), np.where(first, heights, own))
+    query_heights = np.broadcast_to(query.heights, heights.shape)
+    in_order = np.array([query.graph.key <= o.graph.key for o in others])[:, None, None]
+    distance = outline_distances(
+        np.where(in_order, query_heights, heights), np.where(in_order, heights, query_heights)
+    )
     return np.asarray(np.exp(-((distance / OUTLINE_SCALE) ** 2)))

@@ -33,7 +33,7 @@ BEARINGS = 32
 SHARES = (0.06, 0.11, 0.18, 0.28, 0.45)
 """Shares of a view's area that are cut off, one line each."""
 
-CACHED = 4096
+MOST_CACHED = 4096
 """Most views kept prepared."""
 
 _EDGES = np.concatenate([np.linspace(0.0, 1.2, 11), np.linspace(1.45, 2.95, 7)])
@@ -135,8 +135,8 @@ class CutIndex:
         self._shapes = shapes
         self._slots = np.full(len(shapes), -1, dtype=np.intp)
         self._used = 0
-        size = (min(len(shapes), CACHED), BEARINGS, len(SHARES))
-        self._codes = np.zeros((*size, _basis().shape[1]), dtype=np.float32)
+        size = (min(len(shapes), MOST_CACHED), BEARINGS, len(SHARES))
+        self._coefficients = np.zeros((*size, _basis().shape[1]), dtype=np.float32)
         self._powers = np.zeros(size, dtype=np.float32)
         self._offsets = np.zeros(size, dtype=np.float32)
 
@@ -147,7 +147,7 @@ class CutIndex:
 
         Args:
             query: Its map, see `query_map`.
-            among: Numbers of the views to search, `CACHED` at most.
+            among: Numbers of the views to search, `MOST_CACHED` at most.
             most: How many to return.
             mirror: Whether mirror images count.
 
@@ -155,24 +155,24 @@ class CutIndex:
             (number of the view, its best cut), best first.
         """
         slots = self._prepared(among)
-        both = np.stack([query, mirrored_map(query)] if mirror else [query], axis=1)
-        waves = (_basis().T @ both).astype(np.float32)
+        queries = np.stack([query, mirrored_map(query)] if mirror else [query], axis=1)
+        waves = (_basis().T @ queries).astype(np.float32)
         # Squared distances of maps from the query's, (V, BEARINGS, SHARES, 1 or 2).
-        codes = self._codes[slots]
-        near = (codes.reshape(-1, len(waves)) @ waves).reshape(*codes.shape[:3], -1)
-        apart = self._powers[slots][..., None] - 2 * near
-        apart += np.float32((waves**2).sum() / waves.shape[1])
-        flat = apart.reshape(len(among), -1)
+        codes = self._coefficients[slots]
+        products = (codes.reshape(-1, len(waves)) @ waves).reshape(*codes.shape[:3], -1)
+        distances = self._powers[slots][..., None] - 2 * products
+        distances += np.float32((waves**2).sum() / waves.shape[1])
+        flat = distances.reshape(len(among), -1)
         best = flat.argmin(axis=1)
         order = np.argsort(flat[np.arange(len(among)), best], kind="stable")[:most]
-        places = np.arange(len(self._codes))[slots][order]
-        cuts = self._between(places, apart[order], best[order], float(query @ query))
+        places = np.arange(len(self._coefficients))[slots][order]
+        cuts = self._interpolated(places, distances[order], best[order], float(query @ query))
         return list(zip(among[order].tolist(), cuts, strict=True))
 
     def _prepared(self, among: NDArray[np.intp]) -> NDArray[np.intp] | slice:
         """Slots of the prepared views; contiguous ones as a slice, to avoid a copy."""
         missing = among[self._slots[among] < 0]
-        if self._used + len(missing) > len(self._codes):
+        if self._used + len(missing) > len(self._coefficients):
             self._slots[:] = -1
             self._used = 0
             missing = among
@@ -187,14 +187,14 @@ class CutIndex:
         slot = self._slots[number] = self._used
         self._used += 1
         maps, offsets = _PaintedShape(self._shapes[number].contour).cut()
-        self._codes[slot] = maps @ _basis()
-        self._powers[slot] = (self._codes[slot] ** 2).sum(axis=-1)
+        self._coefficients[slot] = maps @ _basis()
+        self._powers[slot] = (self._coefficients[slot] ** 2).sum(axis=-1)
         self._offsets[slot] = offsets
 
-    def _between(
+    def _interpolated(
         self,
         slots: NDArray[np.intp],
-        apart: NDArray[np.float32],
+        distances: NDArray[np.float32],
         best: NDArray[np.intp],
         power: float,
     ) -> list[CutLine]:
@@ -202,43 +202,51 @@ class CutIndex:
 
         Args:
             slots: (K,) slots of the views.
-            apart: (K, BEARINGS, SHARES, S) squared distances.
+            distances: (K, BEARINGS, SHARES, S) squared distances.
             best: (K,) flat indices of their minima.
             power: Power of the query's map.
         """
-        turn, share, side = np.unravel_index(best, apart.shape[1:])
-        each = np.arange(len(slots))
-        about = (turn[:, None] + (-1, 0, 1)) % BEARINGS
-        aside, gained = _lowest(apart[each[:, None], about, share[:, None], side[:, None]])
+        bearing_number, share, side = np.unravel_index(best, distances.shape[1:])
+        numbers = np.arange(len(slots))
+        adjacent = (bearing_number[:, None] + (-1, 0, 1)) % BEARINGS
+        bearing_step, bearing_gain = _parabola_minima(
+            distances[numbers[:, None], adjacent, share[:, None], side[:, None]]
+        )
         inner = np.clip(share, 1, len(SHARES) - 2)
-        along = inner[:, None] + (-1, 0, 1)
-        step, more = _lowest(apart[each[:, None], turn[:, None], along, side[:, None]])
-        step, more = np.where(inner == share, (step, more), 0.0)
-        at = share + step
-        low = np.clip(np.floor(at), 0, len(SHARES) - 2).astype(np.intp)
-        part = at - low
+        adjacent_shares = inner[:, None] + (-1, 0, 1)
+        share_step, share_gain = _parabola_minima(
+            distances[numbers[:, None], bearing_number[:, None], adjacent_shares, side[:, None]]
+        )
+        share_step, share_gain = np.where(inner == share, (share_step, share_gain), 0.0)
+        position = share + share_step
+        lower = np.clip(np.floor(position), 0, len(SHARES) - 2).astype(np.intp)
+        fraction = position - lower
         shares = np.array(SHARES)
-        offsets = self._offsets[slots[:, None], about]
-        columns = (1 - part[:, None]) * offsets[each[:, None], (0, 1, 2), low[:, None]]
-        columns += part[:, None] * offsets[each[:, None], (0, 1, 2), low[:, None] + 1]
-        neighbour = columns[each, np.where(aside < 0, 0, 2)]
-        offset = columns[:, 1] + np.abs(aside) * (neighbour - columns[:, 1])
-        left = np.maximum(0.0, apart.reshape(len(slots), -1)[each, best] - gained - more)
-        alike = np.clip(1.0 - left / (power + self._powers[slots, turn, share]), 0.0, 1.0)
-        bearing = (turn + aside) * (2 * np.pi / BEARINGS)
-        cut_off = (1 - part) * shares[low] + part * shares[low + 1]
-        rows = zip(bearing, offset, cut_off, alike, side > 0, strict=True)
+        offsets = self._offsets[slots[:, None], adjacent]
+        columns = (1 - fraction[:, None]) * offsets[numbers[:, None], (0, 1, 2), lower[:, None]]
+        columns += fraction[:, None] * offsets[numbers[:, None], (0, 1, 2), lower[:, None] + 1]
+        neighbour = columns[numbers, np.where(bearing_step < 0, 0, 2)]
+        offset = columns[:, 1] + np.abs(bearing_step) * (neighbour - columns[:, 1])
+        distance = np.maximum(
+            0.0, distances.reshape(len(slots), -1)[numbers, best] - bearing_gain - share_gain
+        )
+        similarities = np.clip(
+            1.0 - distance / (power + self._powers[slots, bearing_number, share]), 0.0, 1.0
+        )
+        bearing = (bearing_number + bearing_step) * (2 * np.pi / BEARINGS)
+        cut_share = (1 - fraction) * shares[lower] + fraction * shares[lower + 1]
+        rows = zip(bearing, offset, cut_share, similarities, side > 0, strict=True)
         return [CutLine(float(b), float(o), float(c), float(s), bool(m)) for b, o, c, s, m in rows]
 
 
-def _lowest(three: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _parabola_minima(three: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Minima of parabolas through three values (K, 3): offset from the middle, in steps, and depth."""
     before, middle, after = three.astype(np.float64).T
-    bend = before - 2 * middle + after
-    hollow = bend > 1e-9
-    step = np.clip(0.5 * (before - after) / np.where(hollow, bend, 1.0), -0.5, 0.5)
-    gained = -(0.5 * bend * step**2 + 0.5 * (after - before) * step)
-    return np.where(hollow, step, 0.0), np.where(hollow, gained, 0.0)
+    curvature = before - 2 * middle + after
+    is_convex = curvature > 1e-9
+    step = np.clip(0.5 * (before - after) / np.where(is_convex, curvature, 1.0), -0.5, 0.5)
+    depth = -(0.5 * curvature * step**2 + 0.5 * (after - before) * step)
+    return np.where(is_convex, step, 0.0), np.where(is_convex, depth, 0.0)
 
 
 def cut_outline(contour: NDArray[np.floating], cut: CutLine) -> NDArray[np.float64]:

@@ -22,20 +22,20 @@ from visup.percepts.shape.refinement.region_image import RegionImage
 SHADING = 0.3
 """Weight of the explained shading relative to the overlap."""
 
-COARSE = np.radians([16.0, 8.0, 4.0])
+COARSE_STEPS = np.radians([16.0, 8.0, 4.0])
 """Steps of a full search from the orientations of views, radians; its results are then refined."""
 
-FINE = np.radians([2.0, 1.0, 0.5])
+FINE_STEPS = np.radians([2.0, 1.0, 0.5])
 """Steps of the search from a recently fitted orientation, radians; a coarser last step would lag behind slow
 rotation."""
 
-STILL = np.zeros(0)
+NO_STEPS = np.zeros(0)
 """No steps: the orientation is only compared."""
 
 USUAL_FOCAL = 1.2
 """Focal length of a usual lens, in widths of the image (a horizontal field of view of 45 degrees)."""
 
-SAME = np.radians(12.0)
+SAME_ORIENTATION = np.radians(12.0)
 """Orientations closer than this are the same, radians."""
 
 
@@ -59,7 +59,7 @@ class PoseFit:
     start: int
 
     @property
-    def worth(self) -> float:
+    def score(self) -> float:
         """The score by which fits are ranked."""
         return self.overlap + SHADING * self.explained
 
@@ -69,7 +69,7 @@ def fitted_poses(
     image: RegionImage,
     starts: Iterable[NDArray[np.float64]],
     *,
-    steps: NDArray[np.float64] = COARSE,
+    steps: NDArray[np.float64] = COARSE_STEPS,
     focal_px: float,
 ) -> list[PoseFit]:
     """Search from several orientations; distinct results, best first.
@@ -82,15 +82,17 @@ def fitted_poses(
         focal_px: Focal length, pixels of the frame.
     """
     mesh = (model.vertices, model.faces, model.normals)
-    distance, cover = _distance(image, focal_px), float(image.cover.sum())
+    distance, cover = _viewing_distance(image, focal_px), float(image.cover.sum())
     found = []
     for number, start in enumerate(starts):
-        at = np.ascontiguousarray(start, dtype=np.float64)
-        turn, overlap, explained, scale = climb(
-            mesh, (image.cover, image.tone), at, distance, steps, SHADING
+        start_orientation = np.ascontiguousarray(start, dtype=np.float64)
+        orientation, overlap, explained, scale = climb(
+            mesh, (image.cover, image.tone), start_orientation, distance, steps, SHADING
         )
-        found.append(PoseFit(turn, overlap, explained, cover * (model.radius / scale) ** 2, number))
-    found.sort(key=lambda f: (-f.worth, f.start))
+        found.append(
+            PoseFit(orientation, overlap, explained, cover * (model.radius / scale) ** 2, number)
+        )
+    found.sort(key=lambda f: (-f.score, f.start))
     return _distinct(found)
 
 
@@ -99,12 +101,13 @@ class SurfacePoints:
     """Where points of an image lie on a mesh.
 
     Attributes:
-        bodies: (N, 3) relative to the mesh's centre, z away from the viewer, pixels of the frame; NaN beside
+        positions: (N, 3) relative to the mesh's centre, z away from the viewer, pixels of the frame; NaN
+            beside
             the mesh.
         distance: From the viewer to that centre, the same pixels.
     """
 
-    bodies: NDArray[np.float64]
+    positions: NDArray[np.float64]
     distance: float
 
 
@@ -124,21 +127,21 @@ def surface_points(
         points: (N, 2) (x, y) from the centre of the region's box, pixels of the frame.
         focal_px: Focal length, pixels of the frame.
     """
-    mesh, seen = (model.vertices, model.faces, model.normals), (image.cover, image.tone)
-    _, place = surface_depth(mesh, seen, orientation, _distance(image, focal_px))
+    mesh, observed = (model.vertices, model.faces, model.normals), (image.cover, image.tone)
+    _, place = surface_depth(mesh, observed, orientation, _viewing_distance(image, focal_px))
     # The orientation is known here, and with it the radius.
-    far = max(2.0, focal_px / float(place[2] * image.pixel))
-    depth, place = surface_depth(mesh, seen, orientation, far)
+    distance = max(2.0, focal_px / float(place[2] * image.pixel))
+    depth, place = surface_depth(mesh, observed, orientation, distance)
     side = len(depth)
     column, row = (points / image.pixel + side / 2).astype(int).clip(0, side - 1).T
     z = np.where(np.isfinite(depth[row, column]), depth[row, column], np.nan)
-    about = points - (place[:2] - side / 2) * image.pixel
+    offsets = points - (place[:2] - side / 2) * image.pixel
     radius = float(place[2] * image.pixel)
-    bodies = np.column_stack([about * (1 + z / far)[:, None], z * radius])
-    return SurfacePoints(bodies, far * radius)
+    positions = np.column_stack([offsets * (1 + z / distance)[:, None], z * radius])
+    return SurfacePoints(positions, distance * radius)
 
 
-def _distance(image: RegionImage, focal_px: float) -> float:
+def _viewing_distance(image: RegionImage, focal_px: float) -> float:
     """Approximate distance of the object, in units of its radius; at least two.
 
     Its radius is taken as half its longer side in the image, which is too small for a view along a
@@ -152,11 +155,14 @@ def _distance(image: RegionImage, focal_px: float) -> float:
 def _distinct(fits: Sequence[PoseFit]) -> list[PoseFit]:
     distinct: list[PoseFit] = []
     for fit in fits:
-        if all(apart(fit.orientation, other.orientation) > SAME for other in distinct):
+        if all(
+            rotation_angle_between(fit.orientation, other.orientation) > SAME_ORIENTATION
+            for other in distinct
+        ):
             distinct.append(fit)
     return distinct
 
 
-def apart(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+def rotation_angle_between(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
     """The angle between two orientations, radians."""
     return float(np.arccos(np.clip((np.sum(a * b) - 1.0) / 2.0, -1.0, 1.0)))

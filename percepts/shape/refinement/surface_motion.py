@@ -1,9 +1,9 @@
 """Rotation of a rigid body since an earlier image, from points on its surface.
 
-An outline tells the orientation of a body to some degrees, and its errors last as long as the outline. Points
-on the surface are followed to a fraction of a pixel, so what they tell is how far the body has turned: the
-points lie on the mesh as it was fitted to the earlier image, and the mesh is turned, moved and scaled until
-they are where they were found again.
+An outline determines the orientation of a body to a few degrees, and its errors persist as long as the
+outline. Points on the surface are tracked to a fraction of a pixel, so they show how far the body has
+rotated: the points lie on the mesh as it was fitted to the earlier image, and the mesh is rotated, moved
+and scaled until they project to where they were tracked.
 """
 
 from __future__ import annotations
@@ -26,23 +26,23 @@ Floats = NDArray[np.float64]
 MOST_POINTS = 80
 """Points followed at most."""
 
-FEWEST = 10
-"""Fewest points that tell a rotation."""
+LEAST_POINTS = 10
+"""Least number of points from which a rotation is estimated."""
 
-LEAST_SHARE = 0.5
-"""Least share of the followed points that one rotation must explain: else something else is seen."""
+LEAST_INLIER_SHARE = 0.5
+"""Least share of the tracked points that one rotation must explain; else the image shows something else."""
 
-EXPLAINED_PX = 1.0
+INLIER_PX = 1.0
 """Distance within which a rotation explains a point, pixels."""
 
-FAR = np.cos(np.radians(12.0))
-"""Cosine of the rotation after which a new image is taken, since the surface looks different."""
+LARGEST_ROTATION_COS = np.cos(np.radians(12.0))
+"""Cosine of the rotation after which a new reference image is needed, since the surface looks different."""
 
 _MARGIN = 0.25
 _QUALITY, _APART_PX = 0.02, 4
 _RING = 5, 13
 """Pixels: sides of the squares by which a body grows to where its surroundings begin and end."""
-_PLAIN = 12
+_PLAIN_TONE_RANGE = 12
 """Range of tones, from the 5th to the 95th percentile, up to which surroundings are plain."""
 _RETURNS_PX = 0.3
 _WINDOW = (15, 15)
@@ -52,7 +52,7 @@ _STEP = 1e-4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SurfaceImage:
-    """An image of a body with points on it that can be found again.
+    """An image of a body with trackable points on it.
 
     Attributes:
         grey: (h, w) uint8, the surroundings of its region.
@@ -71,18 +71,20 @@ class SurfaceImage:
 
         Returns:
             (N, 2) positions (x, y) relative to the region's centre as `points` are to that of `grey`, and
-            (N,) which were found: those that are followed back to where they were.
+            (N,) which were found: those that track back to where they were.
         """
         now = _surroundings(frame, region, (self.grey.shape[1], self.grey.shape[0]))
-        there, seen, _ = cv2.calcOpticalFlowPyrLK(
+        positions, forward_status, _ = cv2.calcOpticalFlowPyrLK(
             self.grey, now, self.points, self.points.copy(), winSize=_WINDOW
         )
-        back, again, _ = cv2.calcOpticalFlowPyrLK(
-            now, self.grey, there, there.copy(), winSize=_WINDOW
+        back, backward_status, _ = cv2.calcOpticalFlowPyrLK(
+            now, self.grey, positions, positions.copy(), winSize=_WINDOW
         )
-        off = np.hypot(*(back - self.points).T)
-        found = (seen[:, 0] > 0) & (again[:, 0] > 0) & (off < _RETURNS_PX)
-        return np.asarray(there, np.float64), np.asarray(found, np.bool_)
+        round_trip = np.hypot(*(back - self.points).T)
+        found = (
+            (forward_status[:, 0] > 0) & (backward_status[:, 0] > 0) & (round_trip < _RETURNS_PX)
+        )
+        return np.asarray(positions, np.float64), np.asarray(found, np.bool_)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,30 +101,32 @@ class FollowedSurface:
     orientations: Floats
     points: tuple[SurfacePoints, ...]
 
-    def turned(self, frame: Frame, region: Region) -> tuple[NDArray[np.intp], Floats]:
+    def current_orientations(self, frame: Frame, region: Region) -> tuple[NDArray[np.intp], Floats]:
         """The orientations in a later frame.
 
         Returns:
-            (M,) numbers of those that agree with how the surface moved, and (M, 3, 3) what they are now.
+            (M,) numbers of those consistent with the motion of the surface, and (M, 3, 3) the current ones.
         """
-        there, found = self.image.found_in(frame, region)
+        positions, found = self.image.found_in(frame, region)
         height, width = self.image.grey.shape
-        there -= (np.array([width, height]) - 1) / 2
-        agree, turns = [], []
-        for k, on in enumerate(self.points):
-            use = found & ~np.isnan(on.bodies[:, 2])
-            turn = rotation_since(on.bodies[use], there[use], on.distance)
-            if turn is not None:
-                agree.append(k)
-                turns.append(turn @ self.orientations[k])
-        return np.array(agree, np.intp), np.array(turns).reshape(-1, 3, 3)
+        positions -= (np.array([width, height]) - 1) / 2
+        numbers, rotated = [], []
+        for k, on_mesh in enumerate(self.points):
+            usable = found & ~np.isnan(on_mesh.positions[:, 2])
+            rotation = rotation_since(
+                on_mesh.positions[usable], positions[usable], on_mesh.distance
+            )
+            if rotation is not None:
+                numbers.append(k)
+                rotated.append(rotation @ self.orientations[k])
+        return np.array(numbers, np.intp), np.array(rotated).reshape(-1, 3, 3)
 
-    def is_worn(self, numbers: NDArray[np.intp], now: Floats) -> bool:
-        """Whether the body has turned so far since the image that a new one is needed."""
+    def needs_new_image(self, numbers: NDArray[np.intp], current: Floats) -> bool:
+        """Whether the body has rotated so far since the image that a new one is needed."""
         if len(numbers) < len(self.orientations):
             return True
-        cosine = (np.einsum("kij,kij->k", now, self.orientations[numbers]) - 1) / 2
-        return bool((cosine < FAR).any())
+        cosine = (np.einsum("kij,kij->k", current, self.orientations[numbers]) - 1) / 2
+        return bool((cosine < LARGEST_ROTATION_COS).any())
 
     def ordered(self, numbers: Sequence[int]) -> FollowedSurface:
         """The same surface with its orientations in another order."""
@@ -138,7 +142,7 @@ def followed_surface(
     orientations: Floats,
     focal_px: float,
 ) -> FollowedSurface | None:
-    """Begin to follow the surface of a body; None where it shows too little.
+    """Begin to follow the surface of a body; None if it has too few trackable points.
 
     Args:
         frame: The frame that shows it.
@@ -148,17 +152,17 @@ def followed_surface(
         orientations: (K, 3, 3) those fitted.
         focal_px: Focal length, pixels.
     """
-    seen = surface_image(frame, region)
-    if seen is None:
+    surface = surface_image(frame, region)
+    if surface is None:
         return None
-    height, width = seen.grey.shape
-    centred = seen.points.astype(np.float64) - (np.array([width, height]) - 1) / 2
+    height, width = surface.grey.shape
+    centred = surface.points.astype(np.float64) - (np.array([width, height]) - 1) / 2
     points = (surface_points(model, image, o, centred, focal_px) for o in orientations)
-    return FollowedSurface(seen, orientations, tuple(points))
+    return FollowedSurface(surface, orientations, tuple(points))
 
 
 def surface_image(frame: Frame, region: Region) -> SurfaceImage | None:
-    """The image of a region; None where too few points could be found again.
+    """The image of a region; None if it has too few trackable points.
 
     Args:
         frame: The frame that shows it.
@@ -170,10 +174,10 @@ def surface_image(frame: Frame, region: Region) -> SurfaceImage | None:
     mask = np.zeros(grey.shape, np.uint8)
     left, top = round((size[0] - w) / 2), round((size[1] - h) / 2)
     mask[top : top + h, left : left + w] = region.mask
-    # Beside a plain background there is nothing else to follow, and corners of the outline tell most.
+    # On a plain background there is nothing else to track, and corners of the outline are most informative.
     inside = mask if _is_plain_around(mask, grey) else cv2.erode(mask, np.ones((5, 5), np.uint8))
     points = cv2.goodFeaturesToTrack(grey, MOST_POINTS, _QUALITY, _APART_PX, mask=inside)
-    if points is None or len(points) < FEWEST:
+    if points is None or len(points) < LEAST_POINTS:
         return None
     return SurfaceImage(grey, np.asarray(points[:, 0], np.float32))
 
@@ -185,12 +189,12 @@ def _is_plain_around(mask: NDArray[np.uint8], grey: NDArray[np.uint8]) -> bool:
         mask: (h, w) not 0 on the body.
         grey: (h, w).
     """
-    near, far = (cv2.dilate(mask, np.ones((k, k), np.uint8)) for k in _RING)
-    around = grey[(far > 0) & (near == 0)]
+    inner, outer = (cv2.dilate(mask, np.ones((k, k), np.uint8)) for k in _RING)
+    around = grey[(outer > 0) & (inner == 0)]
     if not around.size:
         return False
     low, high = np.percentile(around, (5, 95))
-    return bool(high - low <= _PLAIN)
+    return bool(high - low <= _PLAIN_TONE_RANGE)
 
 
 def _surroundings(frame: Frame, region: Region, size: tuple[int, int]) -> NDArray[np.uint8]:
@@ -200,13 +204,14 @@ def _surroundings(frame: Frame, region: Region, size: tuple[int, int]) -> NDArra
     return np.asarray(cv2.cvtColor(crop, cv2.COLOR_BGR2GRAY), np.uint8)
 
 
-def rotation_since(bodies: Floats, there: Floats, distance: float) -> Floats | None:
-    """By how much a body has turned, as seen from a camera that looks at it.
+def rotation_since(positions: Floats, image_points: Floats, distance: float) -> Floats | None:
+    """The rotation of a body, as seen from a camera that looks at it.
 
     Args:
-        bodies: (N, 3) points of the body as it was: x and y relative to its centre and towards the viewer's
+        positions: (N, 3) points of the body as it was: x and y relative to its centre and towards the
+            viewer's
             far side z, pixels.
-        there: (N, 2) where they are seen now, pixels.
+        image_points: (N, 2) where they are seen now, pixels.
         distance: From the viewer to the body's centre, pixels at the body.
 
     Returns:
@@ -222,32 +227,35 @@ def rotation_since(bodies: Floats, there: Floats, distance: float) -> Floats | N
         >>> Rotation.from_matrix(found).as_rotvec().round(3).tolist()
         [0.02, -0.03, 0.01]
     """
-    if len(bodies) < FEWEST:
+    if len(positions) < LEAST_POINTS:
         return None
     motion = np.zeros(6)
-    motion[3:5] = np.median(there - _seen(bodies, motion, distance), axis=0)
+    motion[3:5] = np.median(image_points - _projected(positions, motion, distance), axis=0)
     for _ in range(_ROUNDS):
-        off = there - _seen(bodies, motion, distance)
+        residuals = image_points - _projected(positions, motion, distance)
         slopes = np.stack(
             [
-                (_seen(bodies, motion + _STEP * e, distance) - there + off) / _STEP
+                (_projected(positions, motion + _STEP * e, distance) - image_points + residuals)
+                / _STEP
                 for e in np.eye(6)
             ],
             axis=-1,
         )
-        weight = 1 / (1 + (off**2).sum(axis=1) / (0.5 * EXPLAINED_PX) ** 2) ** 2
+        weight = 1 / (1 + (residuals**2).sum(axis=1) / (0.5 * INLIER_PX) ** 2) ** 2
         flat, each = slopes.reshape(-1, 6), np.repeat(weight, 2)
         normal = (flat * each[:, None]).T @ flat
         normal[np.diag_indices(6)] *= 1 + 1e-6
-        motion = motion + np.linalg.solve(normal + 1e-9 * np.eye(6), flat.T @ (each * off.ravel()))
-    explained = np.hypot(*(there - _seen(bodies, motion, distance)).T) < EXPLAINED_PX
-    if np.count_nonzero(explained) < max(FEWEST, LEAST_SHARE * len(bodies)):
+        motion = motion + np.linalg.solve(
+            normal + 1e-9 * np.eye(6), flat.T @ (each * residuals.ravel())
+        )
+    explained = np.hypot(*(image_points - _projected(positions, motion, distance)).T) < INLIER_PX
+    if np.count_nonzero(explained) < max(LEAST_POINTS, LEAST_INLIER_SHARE * len(positions)):
         return None
     return np.asarray(Rotation.from_rotvec(motion[:3]).as_matrix(), np.float64)
 
 
-def _seen(bodies: Floats, motion: Floats, distance: float) -> Floats:
-    """(N, 2) where points of a body are seen after a rotation (3), a shift (2) and a growth (1)."""
-    turned = Rotation.from_rotvec(motion[:3]).apply(bodies)
+def _projected(positions: Floats, motion: Floats, distance: float) -> Floats:
+    """(N, 2) projections of points of a body after a rotation (3), a shift (2) and a change of scale (1)."""
+    turned = Rotation.from_rotvec(motion[:3]).apply(positions)
     nearer = np.exp(motion[5]) / (1 + turned[:, 2:] / distance)
     return np.asarray(turned[:, :2] * nearer + motion[3:5], np.float64)

@@ -99,25 +99,30 @@ class SkeletonTree:
         xy = [np.interp(at, self._along, self.points[:, k]) for k in (0, 1)]
         return np.stack(xy, axis=-1)
 
-    def ways(
-        self, here: SkeletonPlaces, there: SkeletonPlaces
+    def paths(
+        self, origins: SkeletonPlaces, targets: SkeletonPlaces
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """Paths along the skeleton from N positions to M others.
 
         Returns:
             (N, M) path lengths; and (N, M) whether each starts towards the end of its branch.
         """
-        first, last = self._ends[there.branch].T
-        rest = self.lengths[there.branch] - there.offset
-        sides = []
-        for side, out in ((0, here.offset), (1, self.lengths[here.branch] - here.offset)):
-            reach = self._between[self._ends[here.branch, side]]
-            nearer = np.minimum(reach[:, first] + there.offset, reach[:, last] + rest)
-            sides.append(nearer + out[:, None])
-        same = here.branch[:, None] == there.branch[None]
-        step = there.offset[None] - here.offset[:, None]
-        length = np.where(same, np.abs(step), np.minimum(*sides))
-        return length, np.where(same, step > SAME_PLACE, sides[1] < sides[0])
+        first, last = self._ends[targets.branch].T
+        beyond = self.lengths[targets.branch] - targets.offset
+        by_side = []
+        for side, to_end in (
+            (0, origins.offset),
+            (1, self.lengths[origins.branch] - origins.offset),
+        ):
+            end_distances = self._between[self._ends[origins.branch, side]]
+            shortest = np.minimum(
+                end_distances[:, first] + targets.offset, end_distances[:, last] + beyond
+            )
+            by_side.append(shortest + to_end[:, None])
+        same = origins.branch[:, None] == targets.branch[None]
+        step = targets.offset[None] - origins.offset[:, None]
+        length = np.where(same, np.abs(step), np.minimum(*by_side))
+        return length, np.where(same, step > SAME_PLACE, by_side[1] < by_side[0])
 
 
 def _distances(
@@ -125,23 +130,25 @@ def _distances(
 ) -> NDArray[np.float64]:
     """Path lengths between all ends of branches of a tree, (size, size)."""
     between = np.zeros((size, size))
-    known, todo = [int(ends[0, 0])], list(range(len(ends)))
-    while todo:
-        k = next(k for k in todo if ends[k, 0] in known or ends[k, 1] in known)
-        todo.remove(k)
+    connected, remaining = [int(ends[0, 0])], list(range(len(ends)))
+    while remaining:
+        k = next(k for k in remaining if ends[k, 0] in connected or ends[k, 1] in connected)
+        remaining.remove(k)
         a, b = (int(e) for e in ends[k])
-        old, new = (a, b) if a in known else (b, a)
-        between[new, known] = between[known, new] = between[old, known] + lengths[k]
-        if new != old:
-            known.append(new)
-            between[new, new] = 0.0
+        near_end, far_end = (a, b) if a in connected else (b, a)
+        between[far_end, connected] = between[connected, far_end] = (
+            between[near_end, connected] + lengths[k]
+        )
+        if far_end != near_end:
+            connected.append(far_end)
+            between[far_end, far_end] = 0.0
     return between
 
 
 def directed_contexts(
     area: NDArray[np.float64],
     thickness: NDArray[np.float64],
-    ways: NDArray[np.float64],
+    path_lengths: NDArray[np.float64],
     positions: NDArray[np.float64],
     directions: NDArray[np.float64],
 ) -> NDArray[np.float64]:
@@ -150,7 +157,7 @@ def directed_contexts(
     Args:
         area: (P, 2) points evenly spread over the shape.
         thickness: (P,) radius of the shape's disc that contains each point.
-        ways: (N, P) distance along the skeleton from each position to each point.
+        path_lengths: (N, P) distance along the skeleton from each position to each point.
         positions: (N, 2) the positions.
         directions: (N, 2) unit vectors of the skeleton there; (0, 0) puts all points straight ahead.
 
@@ -163,18 +170,18 @@ def directed_contexts(
     ahead = dx * directions[:, :1] + dy * directions[:, 1:]
     aside = np.abs(dy * directions[:, :1] - dx * directions[:, 1:])
     angle = np.arctan2(aside, ahead) * ((ANGLES - 1) / np.pi)
-    ring, angle_low = _rings(ways), np.minimum(angle.astype(np.intp), ANGLES - 2)
+    ring, angle_low = _rings(path_lengths), np.minimum(angle.astype(np.intp), ANGLES - 2)
     ring_low = np.minimum(ring.astype(np.intp), RINGS - 2)
-    far, turned = ring - ring_low, angle - angle_low
+    ring_share, angle_share = ring - ring_low, angle - angle_low
     mass = thickness**-THINNESS
     mass = mass / mass.sum()
     cell = ring_low * ANGLES + angle_low + np.arange(len(positions))[:, None] * CONTEXT
     out = np.zeros(len(positions) * CONTEXT)
-    outer, inner = far * mass, (1 - far) * mass
+    outer, inner = ring_share * mass, (1 - ring_share) * mass
     for step, part in ((0, inner), (ANGLES, outer)):
-        beyond = part * turned
-        for further, weight in ((0, part - beyond), (1, beyond)):
-            flat = (cell + (step + further)).ravel()
+        beyond = part * angle_share
+        for angle_step, weight in ((0, part - beyond), (1, beyond)):
+            flat = (cell + (step + angle_step)).ravel()
             out += np.bincount(flat, weights=weight.ravel(), minlength=len(out))
     return out.reshape(len(positions), CONTEXT)
 

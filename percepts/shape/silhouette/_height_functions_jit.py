@@ -56,7 +56,7 @@ def complexity(heights: Floats) -> float:
 
 
 @compiled
-def turned_over(heights: Floats, mirror: bool, out: Floats) -> None:
+def transposed_heights(heights: Floats, mirror: bool, out: Floats) -> None:
     """Heights (P, H), or those of the mirror image, as (H, P)."""
     count, width = heights.shape
     for i in range(count):
@@ -90,7 +90,7 @@ def point_costs(first: Floats, second: Floats, costs: Floats) -> None:
 
 
 @compiled
-def aligned(costs: Floats, diagonal: int, band: int, skip: float, lanes: Floats) -> float:
+def alignment_cost(costs: Floats, diagonal: int, band: int, skip: float, lanes: Floats) -> float:
     """Least mean cost of an alignment within a band about a diagonal; sideways steps cost `skip`.
 
     Args:
@@ -178,10 +178,10 @@ def alignments(
     sums, best = np.empty(count, np.float64), np.empty(rotations, np.intp)
     for b in range(size):
         for side in range(2):
-            turned_over(second[b], side == 1, other)
+            transposed_heights(second[b], side == 1, other)
             point_costs(first[b if len(first) > 1 else 0], other, costs)
             found = best_diagonals(costs, sums, best)
             least = np.inf
             for k in range(found):
-                least = min(least, aligned(costs, best[k], band, skip, lanes))
+                least = min(least, alignment_cost(costs, best[k], band, skip, lanes))
             out[b, side] = least

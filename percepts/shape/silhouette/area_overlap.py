@@ -50,7 +50,7 @@ def area_map(mask: NDArray[np.bool_]) -> NDArray[np.uint8]:
         (RINGS, ANGLES) uint8, 255 where fully covered. Area beyond 3 units is ignored.
     """
     scale = _PIXELS / float(np.count_nonzero(mask)) ** 0.5
-    tone = _reduced(mask, scale)
+    tone = _blurred_tone(mask, scale)
     total = float(tone.sum())
     if total <= 0:
         return np.zeros((RINGS, ANGLES), dtype=np.uint8)
@@ -63,7 +63,7 @@ def area_map(mask: NDArray[np.bool_]) -> NDArray[np.uint8]:
     return np.asarray(np.rint(255 * np.clip(sampled, 0.0, 1.0)), dtype=np.uint8)
 
 
-def _reduced(mask: NDArray[np.bool_], scale: float) -> NDArray[np.float32]:
+def _blurred_tone(mask: NDArray[np.bool_], scale: float) -> NDArray[np.float32]:
     """The mask at working resolution with a margin, blurred; float32."""
     margin = int(np.ceil(4 * _BLUR * _PIXELS))
     size = tuple(max(1, round(n * scale)) for n in mask.shape[::-1])
@@ -117,16 +117,16 @@ class AreaIndex:
             query: (RINGS, ANGLES) uint8.
             among: Numbers of the views to compare; all when None.
         """
-        return _best(*self._turned(query, among))
+        return _best_rotations(*self._correlations(query, among))
 
     def similarities(
         self, query: NDArray[np.uint8], among: NDArray[np.intp] | None = None
     ) -> NDArray[np.float64]:
         """The similarities of `overlaps` alone, (V, 2), in less time."""
-        turned, powers = self._turned(query, among)
-        return _shares(turned.max(axis=0), powers)
+        correlations, powers = self._correlations(query, among)
+        return _dice_coefficients(correlations.max(axis=0), powers)
 
-    def _turned(
+    def _correlations(
         self, query: NDArray[np.uint8], among: NDArray[np.intp] | None
     ) -> tuple[NDArray[np.floating], NDArray[np.float64]]:
         """Common area at all rotations, (ANGLES, V, 2), and the sums of both areas."""
@@ -153,21 +153,26 @@ def _spectra(maps: NDArray[np.uint8]) -> tuple[NDArray[np.complex64], NDArray[np
     return spectra, powers.astype(np.float64)
 
 
-def _best(turned: NDArray[np.floating], powers: NDArray[np.float64]) -> AreaOverlaps:
+def _best_rotations(
+    correlations: NDArray[np.floating], powers: NDArray[np.float64]
+) -> AreaOverlaps:
     """The best rotation of each view, from overlaps (ANGLES, V, 2): as it is, and mirrored."""
-    best = turned.argmax(axis=0)
-    chosen = np.take_along_axis(turned, best[None], axis=0)[0].astype(np.float64)
+    best = correlations.argmax(axis=0)
+    chosen = np.take_along_axis(correlations, best[None], axis=0)[0].astype(np.float64)
     before, after = (
-        np.take_along_axis(turned, (best[None] + step) % ANGLES, axis=0)[0] for step in (-1, 1)
+        np.take_along_axis(correlations, (best[None] + step) % ANGLES, axis=0)[0]
+        for step in (-1, 1)
     )
     # The vertex of the parabola through the best step and its neighbours.
     bend = np.maximum(2 * chosen - before - after, 1e-9)
     angle = (best + 0.5 * (after - before) / bend) * (2 * np.pi / ANGLES)
     # Mirroring left to right is mirroring top to bottom and a half turn.
     angle[:, 1] = np.pi - angle[:, 1]
-    return AreaOverlaps(_shares(chosen, powers), np.angle(np.exp(1j * angle)))
+    return AreaOverlaps(_dice_coefficients(chosen, powers), np.angle(np.exp(1j * angle)))
 
 
-def _shares(common: NDArray[np.floating], powers: NDArray[np.float64]) -> NDArray[np.float64]:
+def _dice_coefficients(
+    common: NDArray[np.floating], powers: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Dice coefficients, (V, 2)."""
     return np.clip(2.0 * common.astype(np.float64) / np.maximum(powers, 1e-12)[:, None], 0.0, 1.0)

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-ENOUGH = 0.98
+SUFFICIENT_SHARE = 0.98
 """Connected share of the mask from which gaps are not bridged."""
 
-REACHES = (0.015, 0.03, 0.06, 0.1)
+CLOSING_RADII = (0.015, 0.03, 0.06, 0.1)
 """Radii of the closing discs that are tried, in units of the square root of the area."""
 
 _MOST_ISLANDS = 2000
@@ -38,14 +38,14 @@ def join_fragments(mask: NDArray[np.uint8]) -> NDArray[np.bool_]:
         (True, False, 502)
     """
     largest, share, islands = _largest(mask, mask)
-    if share >= ENOUGH or not 1 < islands <= _MOST_ISLANDS:
+    if share >= SUFFICIENT_SHARE or not 1 < islands <= _MOST_ISLANDS:
         return largest
     side = float(np.count_nonzero(mask)) ** 0.5
-    outside = _distance(1 - mask, int(np.ceil(REACHES[-1] * side)) + 2)
+    outside = _distance(1 - mask, int(np.ceil(CLOSING_RADII[-1] * side)) + 2)
     hull = largest
-    for reach in REACHES:
+    for reach in CLOSING_RADII:
         hull, share, _ = _largest(_closed(mask, outside, reach * side), mask)
-        if share >= ENOUGH:
+        if share >= SUFFICIENT_SHARE:
             break
     return _bridged(mask.astype(bool) & hull, hull)
 

@@ -22,13 +22,13 @@ POINTS = 96
 HEIGHTS = 24
 """Heights describing a point."""
 
-SKIP = 0.2
+SKIP_COST = 0.2
 """Cost of each sideways step."""
 
 BAND = 12
 """Points by which an alignment may lead or lag a rotation."""
 
-BETA = 0.2
+COMPLEXITY_OFFSET = 0.2
 """Constant added to the outlines' complexity, the divisor of distances: plain outlines differ little."""
 
 _ROTATIONS = 3
@@ -72,9 +72,9 @@ def outline_distances(
     """
     least = np.empty((len(second), 2))
     one, other = np.ascontiguousarray(first), np.ascontiguousarray(second)
-    alignments(one, other, _ROTATIONS, BAND, SKIP, least)
+    alignments(one, other, _ROTATIONS, BAND, SKIP_COST, least)
     varied = _complexities(first) + _complexities(second)
-    return least / (BETA + varied)[:, None]
+    return least / (COMPLEXITY_OFFSET + varied)[:, None]
 
 
 def _complexities(heights: NDArray[np.float32]) -> NDArray[np.float64]:

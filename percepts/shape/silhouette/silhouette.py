@@ -192,10 +192,10 @@ def _longest_outline(field: NDArray[np.float32]) -> NDArray[np.float64] | None:
     if not found:
         return None
     longest = np.asarray(max(found, key=len)[:, 0], dtype=np.intp)
-    return _on_level(field, longest, level) if len(longest) > 8 else None
+    return _moved_to_level(field, longest, level) if len(longest) > 8 else None
 
 
-def _on_level(
+def _moved_to_level(
     field: NDArray[np.float32], pixels: NDArray[np.intp], level: float
 ) -> NDArray[np.float64]:
     """Pixels moved along the gradient to a level of a smooth field: one step of Newton's method."""

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from tests.percepts.appearance.scenes import SIZES, picture, thing
 from tests.percepts.appearance.test_bodies import TOOL, TRAY, scene
-from visup.percepts.appearance.models.blob import Blob, overlap, without
+from visup.percepts.appearance.models.blob import Blob, overlap_of_smaller, without
 from visup.percepts.appearance.models.pose import PatchPose
 from visup.percepts.appearance.tracking.redetection import RedetectionCandidate, assign_candidates
 from visup.percepts.appearance.tracking.verification import Match
@@ -43,6 +43,6 @@ BLOBS = st.builds(full, *(st.integers(0, 30) for _ in "xy"), *(st.integers(1, 20
 def test_a_blob_without_another_has_nothing_of_it_and_all_else(a: Blob, b: Blob) -> None:
     left = without(a, b)
     shared = a.area - left.area
-    assert overlap(left, b) == 0.0
-    assert shared == pytest.approx(overlap(a, b) * min(a.area, b.area))
+    assert overlap_of_smaller(left, b) == 0.0
+    assert shared == pytest.approx(overlap_of_smaller(a, b) * min(a.area, b.area))
     assert a.mask.all()

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from visup.percepts.detections.box_tracker import LEAST_OVERLAP, MOST_MISSED_FRAMES, MultiBoxTracker
-from visup.percepts.detections.boxes import Box, Detection, overlap
+from visup.percepts.detections.boxes import Box, Detection, intersection_over_union
 
 BOXES = st.tuples(st.floats(0, 80), st.floats(0, 80), st.floats(5, 40), st.floats(5, 40))
 NAMES = st.sampled_from([None, "cup", "hand"])
@@ -62,7 +62,7 @@ def test_numbers_go_on_so_that_boxes_overlap_the_most_in_all(
     kept = numbering.number(1, found([(b, None) for b in now]))
 
     def shared(i: int, j: int) -> float:
-        both = overlap(before[i], now[j])
+        both = intersection_over_union(before[i], now[j])
         return both if both >= LEAST_OVERLAP else 0.0
 
     best = max(

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from tests.paths import SHARED
 from visup.agent import Frame, Hypothesis, Observation, Region
 from visup.percepts.detections import PeopleBehaviour
-from visup.percepts.detections.boxes import overlap
+from visup.percepts.detections.boxes import intersection_over_union
 from visup.percepts.detections.people import person_in
 
 PETS = SHARED / "video" / "mot" / "PETS09-S2L1"
@@ -30,8 +30,11 @@ def test_most_people_of_a_yard_are_found_and_called_so() -> None:
     behaviour, frame = PeopleBehaviour(), frame_of(picture)
     seen = list(behaviour.perceive(frame, Observation(0, 0.0, frame.size), ()))
     boxes = [p.value.bbox for p in seen if isinstance(p.value, Region)]
-    right = [any(overlap(box, person) > 0.5 for person in true) for box in boxes]
-    assert sum(any(overlap(box, p) > 0.5 for box in boxes) for p in true) >= len(true) / 2
+    right = [any(intersection_over_union(box, person) > 0.5 for person in true) for box in boxes]
+    assert (
+        sum(any(intersection_over_union(box, p) > 0.5 for box in boxes) for p in true)
+        >= len(true) / 2
+    )
     assert sum(right) >= 0.7 * len(right)
     assert {p.value.name for p in seen if isinstance(p.value, Hypothesis)} == {"person"}
 

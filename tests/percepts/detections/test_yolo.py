@@ -17,7 +17,7 @@ from tests.clips import moving_disc, write_clip
 from visup.agent import Frame
 from visup.agent.model.errors import SettingsError
 from visup.percepts.detections import Detection, YoloNetwork, decode_yolo, letterbox
-from visup.percepts.detections.boxes import overlap
+from visup.percepts.detections.boxes import intersection_over_union
 
 NAMES = ("person", "cup", "robot")
 Thing = tuple[tuple[float, float, float, float], int, float]
@@ -106,7 +106,7 @@ def test_of_boxes_upon_each_other_the_surest_of_each_class_is_left() -> None:
         ("cup", 0.7),
         ("person", 0.6),
     ]
-    assert overlap(found[0].box, found[2].box) == 0.0
+    assert intersection_over_union(found[0].box, found[2].box) == 0.0
 
 
 def test_arrays_of_no_layout_are_refused() -> None:

@@ -78,7 +78,7 @@ def hypotheses(
     return [p.value for p in percepts]
 
 
-def test_both_keep_the_contract_of_behaviours() -> None:
+def test_shape_and_depth_conform_to_the_contract() -> None:
     assert isinstance(ShapeBehaviour(), Behaviour)
     assert isinstance(DepthBehaviour(), Behaviour)
     assert ShapeBehaviour.contract.gives == ("hypothesis",)
@@ -89,7 +89,7 @@ def test_without_a_database_nothing_is_reported() -> None:
     assert hypotheses(ShapeBehaviour(), 0.0, [region(ZOO["star"])]) == []
 
 
-def test_each_region_gets_its_own_name_first(database: Counting) -> None:
+def test_the_best_hypothesis_of_each_region_is_its_model(database: Counting) -> None:
     regions = [region(ZOO["star"], 1), region(ZOO["walker"], 2)]
     found = hypotheses(ShapeBehaviour(database), 0.0, regions)
     for number, name in ((1, "star"), (2, "walker")):
@@ -100,7 +100,9 @@ def test_each_region_gets_its_own_name_first(database: Counting) -> None:
         assert own[0].scale == pytest.approx(math.sqrt(regions[number - 1].area))
 
 
-def test_an_unchanged_region_is_matched_once_and_reported_always(database: Counting) -> None:
+def test_an_unchanged_region_is_matched_once_and_reported_in_every_frame(
+    database: Counting,
+) -> None:
     behaviour = ShapeBehaviour(database)
     told = [hypotheses(behaviour, k / 25, [region(ZOO["star"])]) for k in range(20)]
     assert all(t and t == told[0] for t in told)
@@ -115,7 +117,7 @@ def test_a_changed_region_is_matched_again_but_not_at_once(database: Counting) -
     assert (soon[0].name, later[0].name) == ("star", "walker")
 
 
-def test_a_frame_never_pays_for_more_matches_than_it_may(database: Counting) -> None:
+def test_matches_per_frame_are_bounded(database: Counting) -> None:
     behaviour = ShapeBehaviour(database)
     regions = [region(ZOO["star"], n) for n in range(1, 6)]
     counts = []
@@ -166,7 +168,7 @@ def test_a_directive_restricts_the_names(database: Counting) -> None:
     assert {h.name for h in found} == {"pear"}
 
 
-def test_names_to_be_tried_first_do_not_win_by_that(database: Counting) -> None:
+def test_try_first_does_not_change_the_ranking(database: Counting) -> None:
     first = Directive("try_first", "these are expected", {"names": ("pear",)})
     found = hypotheses(ShapeBehaviour(database), 0.0, [region(ZOO["star"])], [first])
     assert found[0].name == "star"
@@ -186,7 +188,7 @@ def depths(regions: Sequence[Region], guesses: Sequence[Hypothesis], fov: float)
 
 @settings(max_examples=20, deadline=None)
 @given(st.floats(0.2, 3.0), st.floats(8.0, 30.0), st.floats(20.0, 60.0))
-def test_the_depth_of_a_sphere_is_right(radius: float, distance: float, fov: float) -> None:
+def test_the_depth_of_a_sphere_is_correct(radius: float, distance: float, fov: float) -> None:
     focal = focal_px(SIZE[1], fov)
     area = math.pi * (focal * radius / distance) ** 2
     seen = Region(
@@ -206,7 +208,7 @@ def test_views_that_disagree_on_size_widen_sigma() -> None:
     assert unsure.sigma > 1.5 * sure.sigma
 
 
-def test_what_has_no_known_size_or_is_cut_has_no_depth() -> None:
+def test_cut_regions_or_models_without_size_have_no_depth() -> None:
     guess = [Hypothesis(1, "a", 0, 0.9)]
     assert depths([region(ZOO["star"])], guess, 40.0) == []
     sized = [Hypothesis(1, "a", 0, 0.9, scale=50.0)]
@@ -225,7 +227,7 @@ def test_an_impossible_field_of_view_is_refused(fov: float) -> None:
         DepthBehaviour(None, fov)
 
 
-def test_the_database_tells_sizes_that_hypotheses_lack(database: Counting) -> None:
+def test_sizes_come_from_the_database_if_hypotheses_have_none(database: Counting) -> None:
     seen = observation(
         0.0, region=[region(ZOO["star"])], hypothesis=[Hypothesis(1, "star", 0, 0.9)]
     )
@@ -234,7 +236,7 @@ def test_the_database_tells_sizes_that_hypotheses_lack(database: Counting) -> No
     assert percept.value.depth == pytest.approx(expected)
 
 
-def test_a_measured_size_goes_before_that_of_the_database(database: Counting) -> None:
+def test_a_measured_size_overrides_that_of_the_database(database: Counting) -> None:
     view = next(v for v in database.views if v.area is not None and not v.cut)
     extent = extents(database, [view.name])[view.name]
     seen = observation(
@@ -252,7 +254,7 @@ def test_a_measured_size_goes_before_that_of_the_database(database: Counting) ->
     assert other.value == plain.value
 
 
-def test_a_region_that_rests_is_matched_less_often_and_told_in_every_frame(
+def test_a_resting_region_is_matched_less_often_and_reported_in_every_frame(
     database: Counting,
 ) -> None:
     shapes = [region(ZOO[name]) for name in list(ZOO)[:2]]
@@ -271,7 +273,7 @@ def test_a_region_that_rests_is_matched_less_often_and_told_in_every_frame(
     assert looks(rest) == 3
 
 
-def test_a_surface_that_cannot_be_followed_is_tried_no_more_often_than_silhouettes(
+def test_a_surface_that_cannot_be_tracked_is_retried_no_more_often_than_silhouettes(
     database: Counting, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """2 s of one region, 25 frames a second: it is matched in the first frame alone."""

@@ -7,7 +7,7 @@ import pytest
 
 from visup.rules.geometry.outlines import outline_gap, prepared_outline
 from visup.rules.geometry.regions import outline
-from visup.rules.geometry.rings import closed_rings, even_rings, joined, rings
+from visup.rules.geometry.rings import closed_rings, concatenated, even_rings, rings
 from visup.testing import region_of
 
 LARGE, SMALL, SPECK = (10, 10, 40, 60), (80, 30, 20, 40), (120, 5, 4, 4)
@@ -39,7 +39,7 @@ def test_each_part_has_its_outline_the_largest_first() -> None:
 
 def test_no_ring_has_points_between_the_parts() -> None:
     parts = rings(region_of(mask(LARGE, SMALL)))
-    for points in (closed_rings(parts, 2.0), joined(even_rings(parts, 96))):
+    for points in (closed_rings(parts, 2.0), concatenated(even_rings(parts, 96))):
         assert not ((points[:, 0] > 50) & (points[:, 0] < 79)).any()
 
 

@@ -190,7 +190,7 @@ def test_taking_up_the_hints_makes_a_mistaken_rule_legal(text: str) -> None:
         ("touching(a, b) and objects() > four", "touching(a, b) and objects() > 4"),
     ],
 )
-def test_what_is_offered_is_what_was_meant(written: str, meant: str) -> None:
+def test_hints_restore_the_intended_text(written: str, meant: str) -> None:
     text = rule(written)
     (error,) = errors_of(text)
     assert isinstance(error.where, SourceLocation)

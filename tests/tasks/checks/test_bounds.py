@@ -45,7 +45,7 @@ def beside(count: int, form: str) -> str:
         ("<t> ::= " + "(" * 3000 + "seen(a)" + ")" * 3000, "too deep|60 deep|characters"),
     ],
 )
-def test_what_cannot_be_followed_is_refused_at_once(text: str, said: str) -> None:
+def test_tasks_beyond_the_limits_are_refused_quickly(text: str, said: str) -> None:
     begin = time.process_time()
     with pytest.raises(VisupError, match=said) as told:
         parse_task(text)
@@ -53,7 +53,7 @@ def test_what_cannot_be_followed_is_refused_at_once(text: str, said: str) -> Non
     assert len(str(told.value)) < 100_000
 
 
-def test_many_mistakes_are_told_in_a_bounded_text() -> None:
+def test_many_mistakes_give_a_bounded_report() -> None:
     text = "<t> ::= " + "\n".join(f"convergin{n}(a, b)" for n in range(5000))
     with pytest.raises(VisupError) as told:
         parse_task(text)
@@ -73,7 +73,7 @@ def test_many_mistakes_are_told_in_a_bounded_text() -> None:
         ).map(lambda t: beside(*t)),
     )
 )
-def test_what_is_accepted_is_watched_drawn_and_written(text: str) -> None:
+def test_accepted_tasks_can_be_supervised_drawn_and_formatted(text: str) -> None:
     task = parse_task(text)
     begin = time.process_time()
     reason, mind = task_reasoner([task]), Mind()
@@ -84,7 +84,7 @@ def test_what_is_accepted_is_watched_drawn_and_written(text: str) -> None:
     assert time.process_time() - begin < 10.0
 
 
-def test_include_stays_in_the_folder_of_the_task(tmp_path: Path) -> None:
+def test_includes_are_limited_to_the_folder_of_the_task(tmp_path: Path) -> None:
     inside = tmp_path / "cell"
     (inside / "parts").mkdir(parents=True)
     (tmp_path / "secret").write_text("the password is swordfish\n")
@@ -100,7 +100,7 @@ def test_include_stays_in_the_folder_of_the_task(tmp_path: Path) -> None:
         assert "swordfish" not in str(told.value)
 
 
-def test_a_root_that_is_given_bounds_includes_instead(
+def test_includes_are_limited_to_the_given_root(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     root, cell = tmp_path / "tasks", tmp_path / "tasks" / "cell"
@@ -118,7 +118,7 @@ def test_a_root_that_is_given_bounds_includes_instead(
 
 
 @pytest.mark.parametrize("name", ["x" * 3900, "x/" * 1900, "\\0", "/dev/zero", "."])
-def test_an_include_that_is_no_file_is_refused(tmp_path: Path, name: str) -> None:
+def test_an_include_of_a_device_or_pipe_is_refused(tmp_path: Path, name: str) -> None:
     (tmp_path / "a.task").write_text(f'include "{name}"\n<t> ::= seen(a)\n')
     with pytest.raises(VisupError) as told:
         load_tasks(tmp_path / "a.task")
@@ -128,7 +128,7 @@ def test_an_include_that_is_no_file_is_refused(tmp_path: Path, name: str) -> Non
 RULE = 'rule close(a, b): warning\n    when gap(a, b) < 9 px\n    say "{a}."\n'
 
 
-def test_a_mark_of_the_byte_order_is_accepted_in_both(tmp_path: Path) -> None:
+def test_a_byte_order_mark_is_accepted_in_both_languages(tmp_path: Path) -> None:
     (tmp_path / "a.rules").write_text(RULE, "utf-8-sig")
     assert load_rules(tmp_path / "a.rules")[0].name == "close"
     (tmp_path / "a.task").write_text("<t> ::= seen(a)\n", "utf-8-sig")
@@ -148,7 +148,7 @@ def test_a_mark_of_the_byte_order_is_accepted_in_both(tmp_path: Path) -> None:
         RULE * 900,
     ],
 )
-def test_rules_that_are_too_much_are_refused_at_once(text: str) -> None:
+def test_rules_beyond_the_limits_are_refused_quickly(text: str) -> None:
     begin = time.process_time()
     with pytest.raises(VisupError) as told:
         parse_rules(text)
@@ -156,7 +156,7 @@ def test_rules_that_are_too_much_are_refused_at_once(text: str) -> None:
     assert len(str(told.value)) < 100_000
 
 
-def test_what_is_no_file_is_read_by_nobody(tmp_path: Path) -> None:
+def test_devices_and_pipes_are_never_read(tmp_path: Path) -> None:
     import os
 
     from visup.runs.inputs.zones import load_zones

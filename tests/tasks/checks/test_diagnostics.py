@@ -44,7 +44,7 @@ def expected_of(text: str, word: str) -> list[str]:
 
 
 @pytest.mark.parametrize("path", GOOD, ids=lambda p: p.stem)
-def test_good_files_have_the_stages_and_actors_that_they_say(path: Path) -> None:
+def test_good_files_have_the_stages_and_actors_in_their_comments(path: Path) -> None:
     text = text_of(path)
     task = parse_task(text, path.name)
     assert list(stage_names(task)) == expected_of(text, "stages")
@@ -53,7 +53,7 @@ def test_good_files_have_the_stages_and_actors_that_they_say(path: Path) -> None
 
 
 @pytest.mark.parametrize("path", BAD, ids=lambda p: p.stem)
-def test_bad_files_are_told_as_written_beside_them(path: Path) -> None:
+def test_bad_files_give_the_expected_messages(path: Path) -> None:
     assert "".join(f"{f}\n" for f in faults_of(path)) == path.with_suffix(".txt").read_text("utf-8")
 
 
@@ -63,12 +63,12 @@ def test_bad_files_with_one_mistake_give_one_message() -> None:
         assert len(faults_of(path)) == several.get(path.stem, 1), path.stem
 
 
-def test_every_code_is_shown_by_a_bad_file() -> None:
+def test_every_error_code_has_a_bad_file() -> None:
     shown = {f.code for p in BAD for f in faults_of(p)}
     assert shown | {"E231"} == set(CODES)
 
 
-def test_an_action_that_needs_percepts_which_nothing_gives_is_told() -> None:
+def test_an_action_whose_percepts_nothing_provides_is_reported() -> None:
     text = "<dock> ::= depth_difference(arm, satellite) < 10 % coupled(arm, satellite)"
     assert diagnose(text)[1] == []
     _, faults = diagnose(text, percepts=frozenset({"region", "health"}))
@@ -103,7 +103,7 @@ def test_there_are_at_least_five_shipped_tasks() -> None:
     assert "dock" in shipped_tasks()
 
 
-def test_a_task_that_is_not_there_is_told_with_those_that_are(tmp_path: Path) -> None:
+def test_a_missing_task_is_reported_with_the_existing_ones(tmp_path: Path) -> None:
     with pytest.raises(TaskError, match=r"no such task file[\s\S]*dock[\s\S]*did you mean"):
         load_task("docks")
     with pytest.raises(TaskError, match="cannot be read"):
@@ -113,7 +113,7 @@ def test_a_task_that_is_not_there_is_told_with_those_that_are(tmp_path: Path) ->
         load_task(tmp_path / "x.task")
 
 
-def test_a_bad_rule_hides_neither_the_others_nor_what_it_defines() -> None:
+def test_a_faulty_rule_hides_neither_other_faults_nor_its_definition() -> None:
     text = (
         "<dock> ::= <a> <b> <c>\n"
         "<a> ::= converging(arm satellite)\n"
@@ -124,12 +124,12 @@ def test_a_bad_rule_hides_neither_the_others_nor_what_it_defines() -> None:
     assert [(f.code, f.place.line) for f in faults] == [("E117", 2), ("E201", 3), ("E205", 4)]
 
 
-def test_the_nearest_word_is_named_whatever_its_case() -> None:
+def test_the_closest_word_is_suggested_regardless_of_case() -> None:
     assert closest("Convergin", ["converging", "diverging"]) == "converging"
     assert closest("zzz", ["converging"]) is None
 
 
-def test_whatever_stands_in_a_file_is_read_or_told_with_its_place() -> None:
+def test_any_file_is_parsed_or_reported_with_positions() -> None:
     found = fuzz(150, seed=7)
     assert (found.raised, found.placeless, found.unstable, found.slow) == ([], [], [], [])
     assert found.good > 0
@@ -138,24 +138,24 @@ def test_whatever_stands_in_a_file_is_read_or_told_with_its_place() -> None:
 
 @settings(max_examples=200, deadline=None)
 @given(st.text(max_size=60))
-def test_any_text_at_all_is_read_or_told(text: str) -> None:
+def test_any_text_is_parsed_or_reported(text: str) -> None:
     _, faults = diagnose(text)
     assert all(isinstance(f, Diagnostic) for f in faults)
 
 
 @pytest.mark.parametrize(("name", "text"), list(long_files(2000)))
-def test_long_files_are_read_in_good_time(name: str, text: str) -> None:
+def test_long_files_are_parsed_quickly(name: str, text: str) -> None:
     start = time.process_time()
     _, faults = diagnose(text)
     assert time.process_time() - start < 2.5  # the bar for 10,000
     assert len(faults) == {"mistaken": MOST_FAULTS, "chain": 1}.get(name, 0)  # too deep a chain
 
 
-def test_a_usual_file_is_read_at_once() -> None:
+def test_a_typical_file_is_parsed_immediately() -> None:
     assert seconds(read_text("inspect"), 20) < 0.05  # the bar is 10 ms
 
 
-def test_many_stages_that_double_each_other_are_no_trap() -> None:
+def test_exponentially_nested_stages_are_checked_quickly() -> None:
     doubled = [f"<s{i}> ::= (<s{i + 1}> | gone(x)) <s{i + 1}>" for i in range(60)]
     start = time.process_time()
     assert diagnose("\n".join([*doubled, "<s60> ::= seen(a)"]))[1] == []

@@ -11,7 +11,7 @@ from tests.tasks.checks.mistakes.mutations import KINDS, slips
 ONE_IN = 20
 
 
-def test_nearly_all_mechanical_mistakes_are_mended_by_their_hints() -> None:
+def test_hints_fix_nearly_all_mechanical_mistakes() -> None:
     found = [one for _, one in accounts(of_each=1, seed=5, every=ONE_IN)]
     assert len(found) > 60
     assert all(one.told for one in found)
@@ -19,7 +19,7 @@ def test_nearly_all_mechanical_mistakes_are_mended_by_their_hints() -> None:
     assert sum(one.restored for one in found) >= 0.7 * len(found)
 
 
-def test_a_slip_changes_one_place_of_a_text_and_of_each_kind_there_are_some() -> None:
+def test_each_mutation_changes_one_place_and_every_kind_occurs() -> None:
     kinds: set[str] = set()
     for good in (*good_rules()[::8], *good_tasks()[::8]):
         for slip in slips(good, Random(1)):

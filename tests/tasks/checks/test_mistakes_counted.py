@@ -67,7 +67,7 @@ def mended(text: str, read: Callable[[str], list[Told]]) -> bool:
     return not told
 
 
-def test_of_a_hundred_mistakes_95_are_told_with_a_change_that_mends_them() -> None:
+def test_hints_fix_95_percent_of_the_counted_mistakes() -> None:
     rules = {c: mended(rule(c), of_rules) for c in CONDITIONS}
     rules |= {r: mended(r, of_rules) for r in WHOLE_RULES}
     stages = {s: mended(f"<t> ::= <a> <b>\n{s}\n<b> ::= coupled(x, y)", of_tasks) for s in STAGES}

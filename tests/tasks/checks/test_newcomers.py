@@ -13,7 +13,7 @@ ONE_IN = 4
 
 
 @pytest.mark.parametrize("name", SETS)
-def test_nearly_all_mistakes_of_newcomers_are_mended_mostly_to_what_was_meant(name: str) -> None:
+def test_hints_fix_nearly_all_mistakes_of_newcomers_mostly_as_intended(name: str) -> None:
     some = [(t, slip) for t in (False, True) for slip in [*pairs(name, t)][::ONE_IN]]
     found = [a for t, slip in some if (a := account_of(slip, t)) is not None]
     assert all(one.told for one in found)
@@ -21,7 +21,7 @@ def test_nearly_all_mistakes_of_newcomers_are_mended_mostly_to_what_was_meant(na
     assert sum(one.restored for one in found) >= 0.6 * len(found)
 
 
-def test_of_all_mistakes_of_newcomers_95_of_a_hundred_have_a_caret_at_the_culprit() -> None:
+def test_carets_mark_the_cause_of_95_percent_of_newcomers_mistakes() -> None:
     found = [one for name in SETS for one in pointings(name)]
     beside = [one.slip.text for one in found if not one.any]
     assert len(beside) <= 0.05 * len(found), beside
@@ -57,13 +57,13 @@ HEAD = "<t> ::= <a> <b>\n<a> ::= touching(x, y)\n<b> ::= coupled(x, y)\n"
         ("<t> ::= the hand touches the part for 1 s\n", "<t> ::= touching(hand, part) for 1 s\n"),
     ],
 )  # fmt: skip
-def test_what_is_offered_is_what_was_meant(written: str, meant: str) -> None:
+def test_hints_restore_the_intended_text(written: str, meant: str) -> None:
     told = of_tasks(written)
     assert told
     assert next(fixes(written, told)).applied(written).split() == meant.split()
 
 
-def test_a_stage_that_is_defined_twice_for_two_things_becomes_two_stages() -> None:
+def test_a_stage_defined_twice_and_used_twice_becomes_two_stages() -> None:
     written = (
         "<t> ::= <move> <grasp> <move> <drop>\n<move> ::= converging(x, y)\n"
         "<grasp> ::= coupled(x, y)\n<move> ::= diverging(x, z)\n<drop> ::= decoupled(x, y)\n"

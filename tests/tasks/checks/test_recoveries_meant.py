@@ -23,25 +23,25 @@ RECOVERIES = [
 
 
 @pytest.mark.parametrize("line", RECOVERIES)
-def test_after_the_hint_it_is_a_recovery(line: str) -> None:
+def test_applying_the_hint_gives_a_recovery(line: str) -> None:
     text = TASK + line + "\n"
     fix = next(fixes(text, of_tasks(text)))
     task = parse_task(fix.applied(text))
     assert len(task.recovered) == 1
 
 
-def test_what_stands_in_a_stage_is_done_when_that_stage_fails() -> None:
+def test_a_recovery_inside_a_stage_belongs_to_that_stage() -> None:
     line = "<b> ::= coupled(x, y) on failure apart(x, y)"
     assert [new for _, new in recoveries(TASK, line)] == ["on failure of <b>: "]
 
 
-def test_an_action_that_a_stage_asks_for_means_that_stage() -> None:
+def test_an_action_in_a_recovery_means_its_stage() -> None:
     line = "on failure coupled( x,y ): <a>"
     assert next(new for _, new in recoveries(TASK, line)) == "on failure of <b>: "
 
 
 @given(st.text(alphabet="<>:=()xyabon failuresw&|", max_size=60))
-def test_only_stages_of_the_file_are_meant(line: str) -> None:
+def test_recoveries_name_only_stages_of_the_file(line: str) -> None:
     for match, new in recoveries(TASK, line):
         assert new in ("on failure of <a>: ", "on failure of <b>: ", "on failure of <t>: ")
         assert line[match.start() : match.end()] == match[0]

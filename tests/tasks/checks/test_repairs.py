@@ -73,7 +73,7 @@ TEXTS = [
 
 
 @pytest.mark.parametrize("text", TEXTS)
-def test_taking_up_the_hints_makes_a_mistaken_file_legal(text: str) -> None:
+def test_applying_all_hints_makes_a_file_valid(text: str) -> None:
     _, faults = diagnose(text, "my.task")
     assert faults
     assert all("^" in str(f) and f.place.line for f in faults)
@@ -88,7 +88,7 @@ def test_taking_up_the_hints_makes_a_mistaken_file_legal(text: str) -> None:
     assert faults == [], text
 
 
-def test_a_change_is_offered_only_where_it_helps() -> None:
+def test_a_hint_is_offered_only_if_it_helps() -> None:
     _, (fault,) = diagnose("<t> ::= converging(a, b) within 5", "my.task")
     assert fault.hint == "write `within 5 s` in place of `within 5`"
     _, (alone,) = diagnose("<t> ::= <t>", "my.task")
@@ -97,7 +97,7 @@ def test_a_change_is_offered_only_where_it_helps() -> None:
     assert diagnose(fix.applied("<t> ::= <t>"), "my.task")[1] == []
 
 
-def test_of_many_mistakes_few_have_their_hints_tried() -> None:
+def test_hints_are_tested_for_the_first_mistakes_only() -> None:
     # Each try reads the file anew and explains all its mistakes: a damaged file took 10 s in an editor.
     text = "<t> ::= seen(a)\n" + "p\n" * 300
     faults = diagnose(text)[1]

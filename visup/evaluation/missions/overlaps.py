@@ -32,12 +32,12 @@ def overlaps_of(
         SettingsError: A mask is missing or cannot be read.
     """
     return {
-        index: _overlap(mission / "masks" / f"{index:05d}.png", labels, seen)
+        index: _overlaps_by_name(mission / "masks" / f"{index:05d}.png", labels, seen)
         for index, seen in record.seen.items()
     }
 
 
-def _overlap(
+def _overlaps_by_name(
     path: Path, labels: Mapping[str, int], seen: Sequence[ObservedObject]
 ) -> dict[str, tuple[int, dict[int, float]]]:
     mask = cv2.imread(opencv_name(path), cv2.IMREAD_UNCHANGED)

@@ -19,7 +19,7 @@ from visup.agent.model.errors import SettingsError
 from visup.evaluation.figures import Progress, silent
 from visup.evaluation.workers import worker_pool
 from visup.percepts.shape.building.database_builder import IMAGE_SUFFIXES, read_silhouette
-from visup.percepts.shape.database.model_database import candidates_wanted
+from visup.percepts.shape.database.model_database import candidate_count
 from visup.percepts.shape.index.view_index import ViewIndex
 from visup.percepts.shape.matching.graph_matching import WEIGHTS, match_nodes
 from visup.percepts.shape.matching.shape_similarity import (
@@ -174,7 +174,7 @@ def _looks_row(i: int) -> NDArray[np.float64]:
     """The contribution of outlines and areas to the similarities of one shape with all previous ones."""
     query = _Shared.shapes[i]
     overlaps = _Shared.areas.overlaps(query.areas, np.arange(i))
-    return compare_outlines_and_areas(query, _Shared.shapes[:i], overlaps).worth
+    return compare_outlines_and_areas(query, _Shared.shapes[:i], overlaps).partial_similarity
 
 
 def _pruning(
@@ -183,7 +183,7 @@ def _pruning(
     """For each query the share of the others that passes the index, and 1 if the best is lost."""
     index = ViewIndex(shapes)
     everyone = np.arange(len(shapes))
-    most = candidates_wanted(len(shapes) - 1)
+    most = candidate_count(len(shapes) - 1)
     compared, lost = np.zeros(len(shapes)), np.zeros(len(shapes))
     for i, shape in enumerate(shapes):
         others = everyone[everyone != i]

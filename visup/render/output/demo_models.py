@@ -17,7 +17,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from visup.percepts.shape.building.database_builder import rendered, silhouette_views
+from visup.percepts.shape.building.database_builder import mesh_file_views, silhouette_views
 from visup.percepts.shape.building.mesh_views import half_sphere_directions
 from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.percepts.shape.index.view_records import NewView
@@ -53,7 +53,7 @@ def rendered_views(name: str, count: int) -> list[NewView]:
         path = Path(folder) / f"{name}.ply"
         trimesh.Trimesh(solid.vertices, solid.faces, process=False).export(path)
         # Symmetric views are not merged, to have as many as the paper.
-        return rendered(path, half_sphere_directions(count))
+        return mesh_file_views(path, half_sphere_directions(count))
 
 
 def arm_masks(every: int = EVERY) -> list[NDArray[np.bool_]]:

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from visup.percepts.shape.building.closed_views import REACH, WORTH, without_gaps
+from visup.percepts.shape.building.closed_views import CLOSING_RADIUS, LEAST_GAIN, without_gaps
 from visup.percepts.shape.matching.shape_similarity import compare_shapes, shape_of
 from visup.percepts.shape.silhouette.silhouette import normalise
 
@@ -23,20 +23,20 @@ def panels(gap: int) -> np.ndarray:
 
 
 @given(st.integers(0, 200))
-def test_nothing_is_taken_away_and_little_is_not_worth_it(seed: int) -> None:
+def test_closing_removes_nothing_and_small_gains_are_dropped(seed: int) -> None:
     rng = np.random.default_rng(seed)
     noise = cv2.GaussianBlur(rng.normal(size=(60, 80)).astype(np.float32), (0, 0), 3)
     mask = noise > 0
     closed = without_gaps(mask)
     if closed is not None:
         assert (closed | ~mask).all()
-        assert closed.sum() >= (1 + WORTH) * mask.sum()
+        assert closed.sum() >= (1 + LEAST_GAIN) * mask.sum()
 
 
 @pytest.mark.parametrize("gap", [4, 8])
 def test_a_narrow_gap_is_filled(gap: int) -> None:
     closed = without_gaps(panels(gap))
-    assert gap < 2 * REACH * panels(gap).sum() ** 0.5
+    assert gap < 2 * CLOSING_RADIUS * panels(gap).sum() ** 0.5
     assert closed is not None
     assert closed[18 : 18 + gap, 20:100].all()
 
@@ -46,7 +46,7 @@ def test_a_disc_has_no_gap() -> None:
     assert without_gaps(np.hypot(ys - 40, xs - 40) < 35) is None
 
 
-def test_what_segmentation_filled_is_like_the_closed_view_and_not_like_the_other() -> None:
+def test_a_filled_silhouette_matches_the_closed_view_better() -> None:
     seen = panels(8)
     seen[18:26, 10:110] = seen[178:186, 10:110] = True
     shapes = [

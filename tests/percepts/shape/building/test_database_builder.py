@@ -50,7 +50,7 @@ def box(path: Path, size: tuple[float, float, float] = (1.0, 2.0, 3.0)) -> Path:
     return path
 
 
-def test_silhouettes_of_a_known_name_become_further_views(stored: Path, tmp_path: Path) -> None:
+def test_silhouettes_of_a_known_model_are_added_to_it(stored: Path, tmp_path: Path) -> None:
     path = tmp_path / "more.db"
     shutil.copyfile(stored, path)
     masks = [flower(((4, d),)) for d in (0.1, 0.12, 0.3, 0.32)]
@@ -60,7 +60,7 @@ def test_silhouettes_of_a_known_name_become_further_views(stored: Path, tmp_path
     assert [v.area for v in own] == [1.0, None, None]
 
 
-def test_views_of_a_box_have_its_size(tmp_path: Path) -> None:
+def test_views_of_a_box_have_its_area(tmp_path: Path) -> None:
     for view in mesh_views(box(tmp_path / "box.ply"), 12):
         assert view.direction is not None
         # The area of a box's parallel projection is the sum of its faces' projections.
@@ -68,7 +68,7 @@ def test_views_of_a_box_have_its_size(tmp_path: Path) -> None:
         assert view.area == pytest.approx(expected, rel=0.01)
 
 
-def test_a_database_is_built_alike_by_one_process_or_two(tmp_path: Path) -> None:
+def test_a_build_gives_the_same_bytes_with_one_process_or_two(tmp_path: Path) -> None:
     meshes = [box(tmp_path / "a.ply"), box(tmp_path / "b.ply", (1, 1, 4))]
     told: list[tuple[int, int, str]] = []
     one = build_database(tmp_path / "1.db", meshes, views=3, progress=lambda *t: told.append(t))
@@ -78,15 +78,13 @@ def test_a_database_is_built_alike_by_one_process_or_two(tmp_path: Path) -> None
     assert [(v.name, v.number) for v in two.views] == [(n, k) for n in "ab" for k in range(3)]
 
 
-def test_a_build_that_was_killed_goes_on_where_it_was(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_killed_build_resumes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(build_parts, "VIEWS_OF_A_PART", 3)
     meshes = [box(tmp_path / "a.ply"), box(tmp_path / "b.ply", (1, 1, 4))]
     whole = build_database(tmp_path / "whole.db", meshes, views=5)
     target = tmp_path / "killed.db"
     rendered: list[str] = []
-    once = database_builder.rendered
+    once = database_builder.mesh_file_views
 
     def dies(mesh: Path, directions: np.ndarray) -> list[NewView]:
         rendered.append(f"{mesh.stem} {len(directions)}")
@@ -94,7 +92,7 @@ def test_a_build_that_was_killed_goes_on_where_it_was(
             raise KeyboardInterrupt
         return once(mesh, directions)
 
-    monkeypatch.setattr(database_builder, "rendered", dies)
+    monkeypatch.setattr(database_builder, "mesh_file_views", dies)
     with pytest.raises(KeyboardInterrupt):
         build_database(target, meshes, views=5)
     assert not target.exists()
@@ -108,7 +106,7 @@ def test_a_build_that_was_killed_goes_on_where_it_was(
     assert not kept.exists()
 
 
-def test_other_settings_or_another_mesh_are_no_part_of_a_build(tmp_path: Path) -> None:
+def test_parts_with_other_settings_or_meshes_are_not_reused(tmp_path: Path) -> None:
     mesh = box(tmp_path / "a.ply")
     first = {p.path for p in parts_of(mesh, tmp_path, 4, 0)}
     others = [parts_of(mesh, tmp_path, 5, 0), parts_of(mesh, tmp_path, 4, 1)]
@@ -116,7 +114,7 @@ def test_other_settings_or_another_mesh_are_no_part_of_a_build(tmp_path: Path) -
     assert all(first.isdisjoint(p.path for p in parts) for parts in others)
 
 
-def test_a_body_of_revolution_is_the_same_from_all_around(tmp_path: Path) -> None:
+def test_views_around_a_body_of_revolution_are_merged(tmp_path: Path) -> None:
     trimesh.creation.icosphere(4).export(tmp_path / "ball.ply")
     (view,) = mesh_views(tmp_path / "ball.ply", 6)
     assert len(view.also) == 5
@@ -134,7 +132,7 @@ def test_symmetric_views_are_merged_with_the_direction_that_shows_them(tmp_path:
     across = toward * (-1, 1, 1)
     other = np.array([0.8, -0.36, 0.48])
     views = merge_symmetric(
-        database_builder.rendered(tmp_path / "box.ply", np.stack([toward, across, other]))
+        database_builder.mesh_file_views(tmp_path / "box.ply", np.stack([toward, across, other]))
     )
     assert [v.direction for v in views] == [tuple(toward), tuple(other)]
     assert views[0].also == (tuple(-across),)
@@ -189,7 +187,7 @@ def test_two_meshes_of_one_name_are_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("content", [None, b"", b"not a mesh"], ids=["missing", "empty", "text"])
-def test_a_bad_mesh_is_refused(tmp_path: Path, content: bytes | None) -> None:
+def test_an_invalid_mesh_is_refused(tmp_path: Path, content: bytes | None) -> None:
     mesh = tmp_path / "bad.ply"
     if content is not None:
         mesh.write_bytes(content)
@@ -203,7 +201,7 @@ def test_a_bad_mesh_is_refused(tmp_path: Path, content: bytes | None) -> None:
     [(0, "0 1 2"), (3, "0 1 7"), (3, "0 1 -1")],
     ids=["none", "beyond", "below"],
 )
-def test_triangles_between_vertices_that_there_are_not_are_refused(
+def test_triangles_with_missing_vertices_are_refused(
     tmp_path: Path, places: int, corners: str
 ) -> None:
     """The loops that cast rays believe the numbers of vertices that they are given."""
@@ -217,7 +215,7 @@ def test_triangles_between_vertices_that_there_are_not_are_refused(
         load_mesh(mesh)
 
 
-def test_folders_without_pictures_are_refused(tmp_path: Path) -> None:
+def test_folders_without_images_are_refused(tmp_path: Path) -> None:
     with pytest.raises(DatabaseError, match="no silhouette pictures"):
         read_silhouettes(tmp_path)
     (tmp_path / "a.png").write_text("no picture")

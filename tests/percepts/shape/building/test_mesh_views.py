@@ -43,7 +43,7 @@ def tight(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_rendered_view_is_what_its_orientation_shows(seed: int) -> None:
+def test_a_rendered_view_agrees_with_its_orientation(seed: int) -> None:
     mesh = lopsided()
     direction = np.random.default_rng(seed).normal(size=3)
     direction /= np.linalg.norm(direction)
@@ -55,7 +55,7 @@ def test_a_rendered_view_is_what_its_orientation_shows(seed: int) -> None:
 
 @pytest.mark.parametrize("behind", [False, True])
 @pytest.mark.parametrize("turn", [0.0, 0.7, -2.0])
-def test_a_match_tells_the_orientation_that_was_shown(
+def test_a_match_recovers_the_rendered_orientation(
     behind: bool, turn: float, tmp_path: Path
 ) -> None:
     mesh = lopsided()
@@ -67,7 +67,7 @@ def test_a_match_tells_the_orientation_that_was_shown(
     true = orientations(direction, turn)
     match = database.query(projected(mesh, true)).matches[0]
     assert match.direction is not None
-    assert match.likeness.mirrored == behind
+    assert match.terms.mirrored == behind
     told = orientations(match.direction, match.rotation)
     swing, roll = swing_and_roll(told, true)
     assert np.degrees(swing) < 1e-3

@@ -32,7 +32,7 @@ def stored(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return small_database(tmp_path_factory.mktemp("db") / "zoo.db").path
 
 
-def test_what_is_written_is_read_back(stored: Path) -> None:
+def test_written_views_are_read_back(stored: Path) -> None:
     database = ModelDatabase.open(stored)
     assert database.names() == tuple(ZOO)
     for view, loaded, mask in zip(database.views, database.shapes, ZOO.values(), strict=True):
@@ -55,7 +55,7 @@ def test_equal_content_gives_equal_bytes(stored: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(ZOO))
-def test_a_turned_shape_is_recognised(stored: Path, name: str) -> None:
+def test_a_rotated_shape_is_recognised(stored: Path, name: str) -> None:
     mask = np.rot90(ZOO[name])
     best = ModelDatabase.open(stored).query(mask, top=2).matches
     assert best[0].view.name == name
@@ -71,7 +71,7 @@ def test_matches_are_ranked_bounded_and_above_the_threshold(stored: Path) -> Non
     assert [m.view.name for m in some] == ["star"]
 
 
-def test_a_query_answers_the_same_as_trying_everything(stored: Path) -> None:
+def test_a_query_equals_an_exhaustive_search(stored: Path) -> None:
     from visup.percepts.shape.matching.shape_similarity import compare_shapes
 
     database = ModelDatabase.open(stored)
@@ -87,11 +87,11 @@ def test_a_query_may_be_restricted_to_names(stored: Path) -> None:
     assert {m.view.name for m in found} == {"pear", "stick"}
 
 
-def test_nothing_looks_like_an_empty_mask(stored: Path) -> None:
+def test_an_empty_mask_matches_nothing(stored: Path) -> None:
     assert ModelDatabase.open(stored).query(np.zeros((20, 20), bool)).matches == ()
 
 
-def test_an_empty_database_answers_nothing(tmp_path: Path) -> None:
+def test_an_empty_database_gives_no_matches(tmp_path: Path) -> None:
     assert ModelDatabase.create(tmp_path / "empty.db").query(ZOO["star"]).matches == ()
 
 
@@ -236,9 +236,7 @@ REFUSED: dict[str, tuple[Callable[[Path], object], str]] = {
 
 
 @pytest.mark.parametrize("case", sorted(REFUSED))
-def test_a_file_that_is_not_as_it_should_be_is_refused(
-    stored: Path, tmp_path: Path, case: str
-) -> None:
+def test_an_invalid_file_is_refused(stored: Path, tmp_path: Path, case: str) -> None:
     damage, message = REFUSED[case]
     path = tmp_path / "bad.db"
     shutil.copyfile(stored, path)
@@ -250,7 +248,7 @@ def test_a_file_that_is_not_as_it_should_be_is_refused(
     assert refused.value.hint
 
 
-def test_views_and_shapes_are_sequences_like_any_other(stored: Path) -> None:
+def test_views_and_shapes_behave_as_sequences(stored: Path) -> None:
     database = ModelDatabase.open(stored)
     views = list(database.views)
     assert database.views[-1] == views[-1]
@@ -262,7 +260,7 @@ def test_views_and_shapes_are_sequences_like_any_other(stored: Path) -> None:
         _ = database.views[len(ZOO)]
 
 
-def test_all_that_a_node_carries_is_stored() -> None:
+def test_all_features_of_a_node_are_stored() -> None:
     derived = {"edges", "below", "key"}
     assert {f.name for f in dataclasses.fields(ShockGraph)} - derived == set(NODE.names or ())
 
@@ -282,24 +280,24 @@ def test_a_failed_write_leaves_the_old_file(stored: Path, tmp_path: Path) -> Non
     assert not list(tmp_path.glob("*.part"))
 
 
-def test_a_database_cannot_be_written_where_no_folder_is(tmp_path: Path) -> None:
+def test_a_database_in_a_missing_folder_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(VisupError, match="cannot be written"):
         ModelDatabase.create(tmp_path / "nowhere" / "a.db")
 
 
-def test_the_file_says_what_it_is(stored: Path) -> None:
+def test_the_file_header_has_application_id_and_version(stored: Path) -> None:
     header = stored.read_bytes()[:100]
     assert header.startswith(b"SQLite format 3")
     assert int.from_bytes(header[68:72], "big") == APPLICATION_ID
     assert int.from_bytes(header[60:64], "big") == VERSION
 
 
-def test_a_mirrored_match_tells_of_the_opposite_direction(stored: Path) -> None:
+def test_a_mirrored_match_has_the_opposite_direction(stored: Path) -> None:
     database = ModelDatabase.open(stored)
     same = database.query(ZOO["walker"], top=1).matches[0]
     mirrored = database.query(ZOO["walker"][:, ::-1], top=1).matches[0]
-    assert (same.view.name, same.likeness.mirrored) == ("walker", False)
-    assert (mirrored.view.name, mirrored.likeness.mirrored) == ("walker", True)
+    assert (same.view.name, same.terms.mirrored) == ("walker", False)
+    assert (mirrored.view.name, mirrored.terms.mirrored) == ("walker", True)
     assert same.direction == (0.0, 0.0, 1.0)
     assert mirrored.direction == (-0.0, -0.0, -1.0)
     assert mirrored.rotation == pytest.approx(0.0, abs=0.1)

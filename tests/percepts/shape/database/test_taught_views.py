@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tests.percepts.shape.shapes import ZOO
 from visup.agent.model.errors import DatabaseError
 from visup.percepts.shape.building.database_builder import silhouette_views
-from visup.percepts.shape.database.file_format import OLDEST, VERSION, TaughtRow
+from visup.percepts.shape.database.file_format import OLDEST_VERSION, VERSION, TaughtRow
 from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.percepts.taught.taught_view import TaughtView, taught_view, taught_view_from_mask
 
@@ -42,7 +42,7 @@ def same(a: TaughtView, b: TaughtView) -> bool:
     height=st.integers(8, 60),
     share=st.floats(0.05, 1.0),
 )
-def test_what_is_taught_is_read_back(
+def test_taught_views_are_read_back(
     tmp_path_factory: pytest.TempPathFactory, seed: int, width: int, height: int, share: float
 ) -> None:
     """Every pixel and every number, whatever the size of the picture and of the outline."""
@@ -54,7 +54,7 @@ def test_what_is_taught_is_read_back(
     assert same(view, read)
 
 
-def test_teaching_adds_up_and_the_same_is_kept_once(tmp_path: Path) -> None:
+def test_teaching_adds_views_without_duplicates(tmp_path: Path) -> None:
     first, second = (taught_view("part", picture(k), SQUARE) for k in range(2))
     other = taught_view("tray", picture(0), SQUARE)
     database = ModelDatabase.create(tmp_path / "a.models").teach([first, other])
@@ -65,7 +65,7 @@ def test_teaching_adds_up_and_the_same_is_kept_once(tmp_path: Path) -> None:
     assert len(database.views) == 0
 
 
-def test_a_silhouette_is_a_view_where_that_is_asked_for(tmp_path: Path) -> None:
+def test_silhouettes_are_stored_as_views_on_request(tmp_path: Path) -> None:
     mask = np.zeros((300, 300), bool)
     mask[: ZOO["star"].shape[0], : ZOO["star"].shape[1]] = ZOO["star"]
     mask = np.roll(mask, (20, 20), (0, 1))
@@ -77,19 +77,19 @@ def test_a_silhouette_is_a_view_where_that_is_asked_for(tmp_path: Path) -> None:
     assert bare.query(ZOO["star"]).matches == ()
 
 
-def test_a_thing_that_the_border_cuts_is_stored_as_cut(tmp_path: Path) -> None:
+def test_an_object_cut_by_the_border_is_stored_as_cut(tmp_path: Path) -> None:
     at_border = [(0, 20), (50, 20), (50, 60), (0, 60)]
     database = ModelDatabase.create(tmp_path / "a.models")
     database = database.teach([taught_view("arm", picture(), at_border)], silhouettes=True)
     assert [v.cut for v in database.views] == [True]
 
 
-def test_an_older_file_is_read_and_renewed(tmp_path: Path) -> None:
+def test_an_older_file_is_read_and_upgraded(tmp_path: Path) -> None:
     path = tmp_path / "old.models"
     ModelDatabase.create(path, silhouette_views("star", [ZOO["star"]], 1))
     run_sql("DROP TABLE taught")(path)
     run_sql("DROP TABLE meshes")(path)
-    run_sql(f"PRAGMA user_version = {OLDEST}")(path)
+    run_sql(f"PRAGMA user_version = {OLDEST_VERSION}")(path)
     database = ModelDatabase.open(path)
     assert (database.names(), database.taught) == (("star",), ())
     database = database.teach([taught_view("part", picture(), SQUARE)])
@@ -98,7 +98,7 @@ def test_an_older_file_is_read_and_renewed(tmp_path: Path) -> None:
     assert database.query(ZOO["star"], top=1).matches[0].view.name == "star"
 
 
-def test_silhouettes_may_be_added_to_what_was_taught(tmp_path: Path) -> None:
+def test_silhouettes_may_be_added_to_taught_views(tmp_path: Path) -> None:
     database = ModelDatabase.create(tmp_path / "a.models")
     database = database.teach([taught_view("part", picture(), SQUARE)])
     database = database.add(silhouette_views("star", [ZOO["star"]], 1))
@@ -106,7 +106,7 @@ def test_silhouettes_may_be_added_to_what_was_taught(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["", "  ", "x" * 201, "two\nlines"])
-def test_a_name_that_is_none_is_refused_and_nothing_is_stored(tmp_path: Path, name: str) -> None:
+def test_an_invalid_name_is_refused_and_nothing_is_stored(tmp_path: Path, name: str) -> None:
     database = ModelDatabase.create(tmp_path / "a.models")
     before = database.path.read_bytes()
     good = taught_view("part", picture(), SQUARE)
@@ -116,7 +116,7 @@ def test_a_name_that_is_none_is_refused_and_nothing_is_stored(tmp_path: Path, na
     assert not list(tmp_path.glob(".*.part"))
 
 
-def test_where_there_is_no_database_one_is_begun(tmp_path: Path) -> None:
+def test_a_missing_database_is_created(tmp_path: Path) -> None:
     assert ModelDatabase.open_or_new(tmp_path / "new.models").names() == ()
     (tmp_path / "text").write_text("no database")
     with pytest.raises(DatabaseError, match="can be read"):
@@ -159,7 +159,7 @@ DAMAGE: dict[str, tuple[Callable[[Path], None], str]] = {
     "no name": (run_sql("UPDATE taught SET name = x'ff'"), "taught view 1 without a name"),
     "no row": (run_sql("UPDATE taught SET number = 4"), "taught view 1 is missing"),
     "no table": (run_sql("DROP TABLE taught"), "its tables"),
-    "older": (run_sql(f"PRAGMA user_version = {OLDEST}"), "its tables"),
+    "older": (run_sql(f"PRAGMA user_version = {OLDEST_VERSION}"), "its tables"),
     "no picture": (with_right_sum("image", lambda b: b[:40]), "a picture that is none"),
     "no PNG": (with_right_sum("scene", lambda b: b"GIF89a" + b), "a picture that is none"),
     "bomb": (with_right_sum("mask", huge), "1048576 x 1048576 pixels"),
@@ -178,7 +178,7 @@ def test_damage_is_reported(tmp_path: Path, case: str) -> None:
     assert str(path) in str(refused.value)
 
 
-def test_an_outline_of_another_size_is_damage(tmp_path: Path) -> None:
+def test_an_outline_of_a_wrong_size_is_reported_as_damage(tmp_path: Path) -> None:
     path = tmp_path / "bad.models"
     ModelDatabase.create(path).teach([taught_view("part", picture(), SQUARE)])
     with closing(sqlite3.connect(path)) as file:

@@ -43,7 +43,7 @@ def race(path: Path, writers: int) -> list[int]:
 
 
 @pytest.mark.parametrize("begun", [False, True])
-def test_nobody_loses_what_was_taught(tmp_path: Path, begun: bool) -> None:
+def test_concurrent_writers_lose_no_taught_view(tmp_path: Path, begun: bool) -> None:
     for k in range(5):
         path = tmp_path / f"{k}.models"
         if begun:
@@ -52,7 +52,7 @@ def test_nobody_loses_what_was_taught(tmp_path: Path, begun: bool) -> None:
         assert sorted(ModelDatabase.open(path).names()) == [f"thing {n}" for n in range(3)]
 
 
-def test_a_writer_that_waits_too_long_says_so(
+def test_a_writer_that_waits_too_long_is_an_error(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "a.models"

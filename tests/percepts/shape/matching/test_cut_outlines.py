@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.percepts.shape.shapes import ZOO, shape
-from visup.percepts.shape.matching.cut_outlines import compare_cut_outlines, framed_outline
+from visup.percepts.shape.matching.cut_outlines import compare_cut_outlines, outline_in_common_frame
 from visup.percepts.shape.matching.truncated_views import CutLine, cut_outline
 from visup.percepts.shape.silhouette.silhouette import polygon_moments
 
@@ -20,10 +20,10 @@ offsets = st.floats(0.1, 0.6)
 
 @settings(max_examples=40, deadline=None)
 @given(names, bearings, offsets, st.booleans())
-def test_the_frame_is_that_of_the_line(
+def test_the_common_frame_is_that_of_the_line(
     name: str, bearing: float, offset: float, mirrored: bool
 ) -> None:
-    left = framed_outline(shape(ZOO[name]).contour, bearing, offset, mirrored=mirrored)
+    left = outline_in_common_frame(shape(ZOO[name]).contour, bearing, offset, mirrored=mirrored)
     area, centroid = polygon_moments(left)
     # Even points cut corners: a little of the area is lost.
     assert area == pytest.approx(1.0, abs=0.08)
@@ -36,7 +36,7 @@ def test_the_frame_is_that_of_the_line(
 
 @settings(max_examples=40, deadline=None)
 @given(names, bearings, offsets, st.floats(-3.1, 3.1), st.booleans())
-def test_a_view_is_like_itself_cut_and_turned(
+def test_a_view_matches_itself_cut_and_rotated(
     name: str, bearing: float, offset: float, turn: float, mirrored: bool
 ) -> None:
     """What a line left of it, turned and mirrored, is held against the view cut by the same line."""
@@ -52,7 +52,7 @@ def test_a_view_is_like_itself_cut_and_turned(
     assert compare_cut_outlines(turned, border + turn, [view], line)[0] > 0.9
 
 
-def test_another_view_is_less_alike() -> None:
+def test_another_view_is_less_similar() -> None:
     view, others = shape(ZOO["walker"]).contour, [shape(ZOO[n]).contour for n in NAMES]
     line = np.array([[0.7, 0.3, 0.0]])
     seen = cut_outline(view, CutLine(0.7, 0.3, 0.0, 1.0, False))
@@ -61,5 +61,5 @@ def test_another_view_is_less_alike() -> None:
     assert np.sort(alike)[-2] < 0.8
 
 
-def test_nothing_to_compare_with_gives_nothing() -> None:
+def test_comparing_with_no_views_gives_no_similarities() -> None:
     assert compare_cut_outlines(shape(ZOO["pear"]).contour, 0.0, [], np.empty((0, 3))).size == 0

@@ -11,7 +11,12 @@ from hypothesis import strategies as st
 
 from tests.percepts.shape.shapes import ZOO, shape
 from visup.percepts.shape.index.view_index import ViewIndex
-from visup.percepts.shape.matching.graph_matching import BREAK, WEIGHTS, correspond, match_graphs
+from visup.percepts.shape.matching.graph_matching import (
+    HIERARCHY_PENALTY,
+    WEIGHTS,
+    corresponding_nodes,
+    match_graphs,
+)
 from visup.percepts.shape.matching.shape_similarity import compare_shapes
 from visup.percepts.shape.shocks.topological_signature import adjacency, descendants, signatures
 
@@ -42,7 +47,9 @@ def test_descendants_of_a_fork() -> None:
     ],
     ids=["path", "fan", "fork"],
 )
-def test_signatures_worked_out_by_hand(edges: np.ndarray, size: int, root: list[float]) -> None:
+def test_signatures_equal_hand_computed_values(
+    edges: np.ndarray, size: int, root: list[float]
+) -> None:
     np.testing.assert_allclose(signatures(edges, size, 2)[0], root, atol=1e-6)
 
 
@@ -63,7 +70,7 @@ def worth(
     """By how much a pair's value falls for the pairs that were taken before it."""
     u, v = pair
     broken = [below_a[x, u] != below_b[y, v] or below_a[u, x] != below_b[v, y] for x, y in taken]
-    return float(BREAK ** sum(broken))
+    return float(HIERARCHY_PENALTY ** sum(broken))
 
 
 def by_brute_force(below_a: np.ndarray, below_b: np.ndarray, value: np.ndarray) -> float:
@@ -102,7 +109,7 @@ def test_matching_agrees_with_brute_force(a: list[int], b: list[int], seed: int)
     below_b = descendants(random_tree(b), len(b) + 1)
     value = np.random.default_rng(seed).uniform(0.05, 1, (len(a) + 1, len(b) + 1))
     value = value.astype(np.float32)
-    pairs = correspond(below_a, below_b, value)
+    pairs = corresponding_nodes(below_a, below_b, value)
     assert len({u for u, _, _ in pairs}) == len({v for _, v, _ in pairs}) == len(pairs)
     taken: list[tuple[int, int]] = []
     for u, v, left in pairs:
@@ -113,12 +120,14 @@ def test_matching_agrees_with_brute_force(a: list[int], b: list[int], seed: int)
     assert total == pytest.approx(by_brute_force(below_a, below_b, value), abs=1e-5)
 
 
-def test_a_match_that_crosses_the_hierarchy_is_worth_less() -> None:
+def test_a_pair_that_contradicts_the_hierarchy_counts_less() -> None:
     chain, fan = descendants(PATH, 3), descendants(np.array([[0, 1], [0, 2]], dtype=np.int16), 3)
     value = np.full((3, 3), 0.25, dtype=np.float32)
     value[1, 1] = 0.5
-    assert sum(w for _, _, w in correspond(chain, chain, value)) == pytest.approx(0.75)
-    assert sum(w for _, _, w in correspond(chain, fan, value)) == pytest.approx(0.5 + BREAK * 0.25)
+    assert sum(w for _, _, w in corresponding_nodes(chain, chain, value)) == pytest.approx(0.75)
+    assert sum(w for _, _, w in corresponding_nodes(chain, fan, value)) == pytest.approx(
+        0.5 + HIERARCHY_PENALTY * 0.25
+    )
 
 
 def test_a_graph_corresponds_to_itself_node_by_node() -> None:
@@ -126,7 +135,7 @@ def test_a_graph_corresponds_to_itself_node_by_node() -> None:
     assert all(u == v for u, v, _ in match_graphs(graph, graph).pairs)
 
 
-def test_the_index_bounds_what_matching_finds() -> None:
+def test_index_bounds_are_upper_bounds_of_matching() -> None:
     shapes = [shape(m) for m in ZOO.values()]
     for query in shapes:
         bounds, _ = ViewIndex(shapes).bounds(query.graph, np.arange(len(shapes)))

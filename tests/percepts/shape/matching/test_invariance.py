@@ -18,7 +18,7 @@ Lobes = tuple[tuple[int, float], ...]
 
 @FEW
 @given(FLOWERS, st.integers(0, 80), st.integers(0, 80))
-def test_translation_changes_nothing(lobes: Lobes, dx: int, dy: int) -> None:
+def test_similarity_is_invariant_to_translation(lobes: Lobes, dx: int, dy: int) -> None:
     mask = flower(lobes, size=40)
     moved = np.pad(mask, ((dy, 3), (dx, 5)))
     here, there = normalise(mask), normalise(moved)
@@ -31,30 +31,32 @@ def test_translation_changes_nothing(lobes: Lobes, dx: int, dy: int) -> None:
 @FEW
 @given(LIMBS, st.floats(0, 2 * np.pi))
 def test_rotation_hardly_changes_a_shape(angles: tuple[float, ...], turn: float) -> None:
-    likeness = compare_shapes(shape(limbs(angles)), shape(limbs(angles, turn=turn)))
-    assert likeness.of_outlines > 0.93
+    terms = compare_shapes(shape(limbs(angles)), shape(limbs(angles, turn=turn)))
+    assert terms.outline_similarity > 0.93
     # Where limbs are alike, noise decides which hangs below which; the graph bears it.
-    assert likeness.of_graphs > 0.8
-    assert likeness.similarity > 0.9
+    assert terms.graph_similarity > 0.8
+    assert terms.similarity > 0.9
 
 
 @FEW
 @given(FLOWERS, st.floats(30, 200))
 def test_scale_hardly_changes_a_shape(lobes: Lobes, size: float) -> None:
-    likeness = compare_shapes(shape(flower(lobes, size=60)), shape(flower(lobes, size=size)))
-    assert likeness.similarity > 0.8
+    terms = compare_shapes(shape(flower(lobes, size=60)), shape(flower(lobes, size=size)))
+    assert terms.similarity > 0.8
 
 
 @FEW
 @given(FLOWERS)
-def test_a_shape_looks_like_its_mirror_image(lobes: Lobes) -> None:
+def test_a_shape_matches_its_mirror_image(lobes: Lobes) -> None:
     mask = flower(lobes)
     assert compare_shapes(shape(mask), shape(mask[:, ::-1])).similarity > 0.85
 
 
 @FEW
 @given(FLOWERS, LIMBS)
-def test_similarity_is_symmetric_and_a_share(lobes: Lobes, angles: tuple[float, ...]) -> None:
+def test_similarity_is_symmetric_and_between_0_and_1(
+    lobes: Lobes, angles: tuple[float, ...]
+) -> None:
     a, b = shape(flower(lobes)), shape(limbs(angles))
     assert compare_shapes(a, b).similarity == compare_shapes(b, a).similarity
     assert 0.0 <= compare_shapes(a, b).similarity <= 1.0
@@ -62,7 +64,7 @@ def test_similarity_is_symmetric_and_a_share(lobes: Lobes, angles: tuple[float, 
 
 
 @pytest.mark.parametrize("name", sorted(ZOO))
-def test_a_shape_is_like_itself_fully_and_like_others_less(name: str) -> None:
+def test_a_shape_has_similarity_1_with_itself_and_less_with_others(name: str) -> None:
     own = shape(ZOO[name])
     assert compare_shapes(own, own).similarity == pytest.approx(1.0, abs=1e-6)
     for other in sorted(set(ZOO) - {name}):
@@ -78,21 +80,21 @@ def test_growing_damage_lowers_the_similarity() -> None:
         rows = np.flatnonzero(whole.any(axis=1))
         damaged[rows[0] : rows[0] + int(share * len(rows))] = False
         found.append(compare_shapes(own, shape(damaged)))
-    for similarities in ([f.similarity for f in found], [f.of_graphs for f in found]):
+    for similarities in ([f.similarity for f in found], [f.graph_similarity for f in found]):
         assert similarities == sorted(similarities, reverse=True)
         assert similarities[-1] < similarities[0] - 0.1
 
 
-def test_holes_and_islands_do_not_matter() -> None:
+def test_holes_and_islands_do_not_change_graph_and_outline() -> None:
     mask = ZOO["clover"].copy()
     clean = shape(mask)
     mask[130:136, 130:136] = False
     mask[2:6, 2:6] = True
     seen = compare_shapes(clean, shape(mask))
-    assert seen.of_graphs == pytest.approx(1.0, abs=1e-6)
-    assert seen.of_outlines == pytest.approx(1.0, abs=1e-6)
+    assert seen.graph_similarity == pytest.approx(1.0, abs=1e-6)
+    assert seen.outline_similarity == pytest.approx(1.0, abs=1e-6)
     # The map of the area shows them, for what they are: a thousandth of it, to the eighth power.
-    assert 1 - seen.of_areas < 0.01
+    assert 1 - seen.area_similarity < 0.01
 
 
 @pytest.mark.parametrize(
@@ -105,7 +107,7 @@ def test_holes_and_islands_do_not_matter() -> None:
     ],
     ids=["empty", "no pixels", "three pixels", "one pixel"],
 )
-def test_a_mask_that_shows_nothing_has_no_shape(mask: np.ndarray) -> None:
+def test_an_empty_mask_has_no_shape(mask: np.ndarray) -> None:
     assert normalise(mask) is None
 
 
@@ -122,7 +124,7 @@ def test_a_mask_that_shows_nothing_has_no_shape(mask: np.ndarray) -> None:
     ],
     ids=["full", "row", "column", "checkerboard", "noise", "dense noise", "diagonal"],
 )
-def test_odd_masks_have_a_shape_or_none_and_never_fail(mask: np.ndarray) -> None:
+def test_degenerate_masks_never_raise(mask: np.ndarray) -> None:
     silhouette = normalise(mask)
     if silhouette is not None:
         own = shape(mask)
@@ -133,7 +135,7 @@ def test_odd_masks_have_a_shape_or_none_and_never_fail(mask: np.ndarray) -> None
 
 @settings(max_examples=15, deadline=None)
 @given(st.floats(-3.1, 3.1))
-def test_a_mirror_image_is_told_apart_on_request(turn: float) -> None:
+def test_mirror_images_are_distinguished_on_request(turn: float) -> None:
     """A body with limbs to one side only is not its mirror image, however it is turned."""
     angles = (0.3, 1.2, 2.9)
     own, image = shape(limbs(angles)), shape(limbs(angles, turn=turn)[:, ::-1])

@@ -48,7 +48,7 @@ def index() -> CutIndex:
 
 
 @pytest.mark.parametrize("side", SIDES)
-def test_the_side_that_cuts_is_found(side: str) -> None:
+def test_the_cutting_side_is_found(side: str) -> None:
     seen = silhouette(cut_off(ZOO["walker"], side, 0.2), cut=True)
     assert seen.border == pytest.approx(SIDES[side])
 
@@ -81,7 +81,7 @@ def test_a_cut_view_is_found_again(name: str, side: str, share: float, mirrored:
         assert abs(cut.share - share) < 0.12 or cut.similarity > 0.985
 
 
-def test_how_much_is_cut_off_is_mostly_known() -> None:
+def test_the_share_cut_off_is_mostly_recovered() -> None:
     errors = []
     for name, side, share in product(NAMES, sorted(SIDES), np.linspace(0.08, 0.35, 10)):
         seen = silhouette(cut_off(ZOO[name], side, share), cut=True)
@@ -95,7 +95,9 @@ def test_how_much_is_cut_off_is_mostly_known() -> None:
 
 @settings(max_examples=60, deadline=None)
 @given(st.sampled_from(NAMES), st.floats(-3.1, 3.1), st.floats(-0.3, 0.6))
-def test_what_is_left_is_what_a_painter_leaves(name: str, bearing: float, offset: float) -> None:
+def test_a_clipped_outline_equals_a_clipped_raster(
+    name: str, bearing: float, offset: float
+) -> None:
     """Its outline, in its own unit, encloses an area of 1; and as much of the view as lies within."""
     whole = shape(ZOO[name]).contour
     left = cut_outline(whole, CutLine(bearing, offset, 0.0, 1.0, False))
@@ -114,7 +116,7 @@ def test_what_is_left_is_what_a_painter_leaves(name: str, bearing: float, offset
         assert span * within**0.5 == pytest.approx(true, rel=0.06)
 
 
-def test_flipping_twice_changes_nothing() -> None:
+def test_mirroring_a_map_twice_is_the_identity() -> None:
     seen = silhouette(cut_off(ZOO["walker"], "left", 0.2), cut=True)
     assert seen.border is not None
     own = query_map(seen.contour, seen.border)
@@ -122,7 +124,7 @@ def test_flipping_twice_changes_nothing() -> None:
     assert not np.array_equal(mirrored_map(own), own)
 
 
-def test_an_index_that_is_asked_for_some_gives_only_these() -> None:
+def test_an_index_searches_only_the_given_views() -> None:
     seen = silhouette(cut_off(ZOO["walker"], "top", 0.2), cut=True)
     assert seen.border is not None
     own = query_map(seen.contour, seen.border)

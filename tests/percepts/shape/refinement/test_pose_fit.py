@@ -60,7 +60,7 @@ def nearby(true: NDArray[np.float64], away: float, seed: int) -> NDArray[np.floa
     return np.asarray(turn @ true)
 
 
-def test_poses_are_found_again_from_nearby() -> None:
+def test_poses_are_recovered_from_nearby_starts() -> None:
     model, errors = satellite(), []
     for seed in range(24):
         true = Rotation.random(random_state=seed).as_matrix()
@@ -81,11 +81,11 @@ def test_a_search_never_ends_worse_than_it_began(seed: int, away: float) -> None
     focal = FAR * SIDE / 4
     still = fitted_poses(model, picture, [start], steps=np.zeros(0), focal_px=focal)[0]
     best = fitted_poses(model, picture, [start], focal_px=focal)[0]
-    assert best.worth >= still.worth
+    assert best.score >= still.score
     assert np.allclose(best.orientation @ best.orientation.T, np.eye(3), atol=1e-9)
 
 
-def test_shading_tells_a_view_from_its_mirror_image() -> None:
+def test_shading_distinguishes_a_view_from_its_mirror_image() -> None:
     """Seen from behind and mirrored, a satellite with a plane of symmetry has the same outline."""
     model, right = satellite(), 0
     for seed in range(8):
@@ -109,7 +109,7 @@ def test_a_large_mesh_is_simplified_and_keeps_its_size() -> None:
     assert MOST_FACES < 3000
 
 
-def test_what_is_stored_is_what_was_kept() -> None:
+def test_stored_meshes_round_trip() -> None:
     model = satellite()
     again = stored_mesh("satellite", model.radius, *mesh_bytes(model))
     assert np.array_equal(again.vertices, model.vertices)
@@ -130,7 +130,7 @@ def test_a_damaged_mesh_is_refused(vertices: bytes, faces: bytes) -> None:
         stored_mesh("x", 1.0, vertices, faces)
 
 
-def test_a_database_keeps_the_meshes_of_its_models(tmp_path: Path) -> None:
+def test_a_database_stores_the_meshes_of_its_models(tmp_path: Path) -> None:
     model = satellite()
     database = ModelDatabase.create(tmp_path / "db", [], [model])
     kept = ModelDatabase.open(database.path).meshes["satellite"]

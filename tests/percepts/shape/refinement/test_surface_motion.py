@@ -59,7 +59,7 @@ def apart_deg(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
     return float(np.degrees(Rotation.from_matrix(a @ b.T).magnitude()))
 
 
-def test_a_rotation_is_told_to_a_fraction_of_a_degree() -> None:
+def test_a_rotation_is_measured_to_a_fraction_of_a_degree() -> None:
     """Most surely in the plane; a face seen from ahead tells little of others."""
     model, errors, rolls = satellite(), [], []
     for seed in range(12):
@@ -67,7 +67,7 @@ def test_a_rotation_is_told_to_a_fraction_of_a_degree() -> None:
         axis = np.random.default_rng(seed).normal(size=3)
         axis *= np.radians(4.0) / np.linalg.norm(axis)
         after = Rotation.from_rotvec(axis).as_matrix() @ before
-        numbers, (now, *_) = begun(model, before).turned(*seen(model, after))
+        numbers, (now, *_) = begun(model, before).current_orientations(*seen(model, after))
         assert numbers.tolist() == [0]
         errors.append(apart_deg(now, after))
         rolls.append(np.degrees(abs(Rotation.from_matrix(now @ after.T).as_rotvec()[2])))
@@ -76,7 +76,7 @@ def test_a_rotation_is_told_to_a_fraction_of_a_degree() -> None:
 
 
 @pytest.mark.parametrize(("textured", "near"), [(False, True), (True, False)])
-def test_corners_of_the_outline_are_followed_only_beside_a_plain_background(
+def test_corners_of_the_outline_are_tracked_only_on_a_plain_background(
     textured: bool, near: bool
 ) -> None:
     frame, region = seen(satellite(), np.eye(3))
@@ -98,36 +98,38 @@ def test_corners_of_the_outline_are_followed_only_beside_a_plain_background(
 def test_another_surface_is_not_followed() -> None:
     model, true = satellite(), Rotation.random(random_state=1).as_matrix()
     other = Rotation.random(random_state=7).as_matrix()
-    numbers, _ = begun(model, true).turned(*seen(model, other, tones=3))
+    numbers, _ = begun(model, true).current_orientations(*seen(model, other, tones=3))
     assert not len(numbers)
 
 
 @pytest.mark.parametrize(("degrees", "worn"), [(3.0, False), (15.0, True)])
-def test_a_picture_is_worn_once_the_body_has_turned_far(degrees: float, worn: bool) -> None:
+def test_a_new_image_is_needed_after_a_large_rotation(degrees: float, worn: bool) -> None:
     true = Rotation.random(random_state=1).as_matrix()
     turned = Rotation.from_rotvec([0.0, np.radians(degrees), 0.0]).as_matrix() @ true
     surface = begun(satellite(), true)
-    assert surface.is_worn(np.array([0]), turned[None]) is worn
-    assert surface.is_worn(np.array([], np.intp), np.zeros((0, 3, 3)))
+    assert surface.needs_new_image(np.array([0]), turned[None]) is worn
+    assert surface.needs_new_image(np.array([], np.intp), np.zeros((0, 3, 3)))
 
 
-def test_a_search_that_finds_an_orientation_again_leaves_it_as_it_was_followed() -> None:
+def test_a_search_that_finds_a_followed_orientation_leaves_it_unchanged() -> None:
     known = Rotation.random(2, random_state=1).as_matrix()
     near = Rotation.from_rotvec([0.05, 0.0, 0.0]).as_matrix() @ known[1]
     fits = [PoseFit(near, 0.9, 0.5, 1.0, 4), PoseFit(known[0].T, 0.8, 0.5, 1.0, 3)]
     surface = begun(satellite(), known[0])
     before = _KnownOrientations(known, (5, 6), surface, True)
-    (first, second), told = before.steadied(fits)
+    (first, second), told = before.with_followed_orientations(fits)
     assert told is None  # the surface says nothing of the second one
-    assert before.steadied(fits[:1])[1] is surface
+    assert before.with_followed_orientations(fits[:1])[1] is surface
     assert first.start == 1
     assert np.array_equal(first.orientation, known[1])
     assert second is fits[1]
 
 
-def test_an_orientation_that_a_search_has_left_is_not_told_by_the_surface() -> None:
+def test_the_surface_is_dropped_if_a_search_found_another_orientation() -> None:
     """It began from the second known one, and is far from it now: numbers alone do not tell that."""
     known = Rotation.random(2, random_state=1).as_matrix()
     fits = [PoseFit(known[0], 0.9, 0.5, 1.0, 0), PoseFit(known[0].T, 0.8, 0.5, 1.0, 1)]
     surface = begun(satellite(), known[0])
-    assert _KnownOrientations(known, (5, 6), surface, True).steadied(fits)[1] is None
+    assert (
+        _KnownOrientations(known, (5, 6), surface, True).with_followed_orientations(fits)[1] is None
+    )

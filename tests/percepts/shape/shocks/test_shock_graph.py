@@ -95,7 +95,7 @@ def test_a_skeleton_is_one_tree_inside_its_shape(angles: tuple[float, ...]) -> N
     assert (skeleton.radii > 0).all()
 
 
-def test_radii_are_right_below_a_pixel() -> None:
+def test_radii_are_accurate_to_less_than_a_pixel() -> None:
     skeleton = skeletonise(shape(RECTANGLE).contour.astype(float))
     unit = np.sqrt(139 * 39)
     assert np.median(skeleton.radii) * unit == pytest.approx(19.5, abs=0.4)

@@ -37,42 +37,42 @@ def by_dijkstra(skeleton: Skeleton) -> np.ndarray:
 
 @FEW
 @given(LIMBS)
-def test_ways_along_the_skeleton_are_the_shortest(angles: tuple[float, ...]) -> None:
+def test_paths_along_the_skeleton_are_the_shortest(angles: tuple[float, ...]) -> None:
     skeleton = skeleton_of(angles)
     tree = SkeletonTree(skeleton)
     numbers = np.concatenate(skeleton.branches)
-    found, _ = tree.ways(tree.places, tree.places)
+    found, _ = tree.paths(tree.places, tree.places)
     np.testing.assert_allclose(found, by_dijkstra(skeleton)[np.ix_(numbers, numbers)], atol=1e-9)
 
 
 @FEW
 @given(LIMBS)
-def test_a_way_sets_out_to_the_side_that_is_nearer(angles: tuple[float, ...]) -> None:
+def test_a_path_starts_towards_the_nearer_end(angles: tuple[float, ...]) -> None:
     tree = SkeletonTree(skeleton_of(angles))
     branches = np.arange(len(tree.lengths))
     middle = SkeletonPlaces(branches, 0.5 * tree.lengths)
     ahead = SkeletonPlaces(branches, 0.5 * tree.lengths + 1e-6)
-    way, onwards = tree.ways(middle, tree.places)
-    from_ahead, _ = tree.ways(ahead, tree.places)
+    way, onwards = tree.paths(middle, tree.places)
+    from_ahead, _ = tree.paths(ahead, tree.places)
     np.testing.assert_array_equal(from_ahead < way, onwards)
 
 
-def test_a_single_point_is_a_skeleton_too() -> None:
+def test_a_single_point_is_a_skeleton() -> None:
     tree = SkeletonTree(Skeleton(np.array([[0.5, 0.25]]), np.array([0.5]), ()))
-    way, _ = tree.ways(tree.places, tree.places)
+    way, _ = tree.paths(tree.places, tree.places)
     assert way.tolist() == [[0.0]]
     assert tree.points_at(np.array([0]), np.array([0.0])).tolist() == [[0.5, 0.25]]
 
 
 def seen(area: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    ways = np.hypot(*area.T)[None]
+    paths = np.hypot(*area.T)[None]
     thickness = np.full(len(area), 0.2)
-    return directed_contexts(area, thickness, ways, np.zeros((1, 2)), direction[None])
+    return directed_contexts(area, thickness, paths, np.zeros((1, 2)), direction[None])
 
 
 @FEW
 @given(st.floats(0, 2 * np.pi), st.booleans())
-def test_contexts_turn_with_the_shape_and_know_no_left(turn: float, mirrored: bool) -> None:
+def test_contexts_are_invariant_to_rotation_and_mirroring(turn: float, mirrored: bool) -> None:
     way = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
     if mirrored:
         way = np.diag([1.0, -1.0]) @ way
@@ -84,7 +84,7 @@ def test_contexts_turn_with_the_shape_and_know_no_left(turn: float, mirrored: bo
     np.testing.assert_allclose(whole_context(BLOB @ way), whole_context(BLOB), atol=1e-9)
 
 
-def test_what_lies_ahead_is_not_what_lies_behind() -> None:
+def test_contexts_distinguish_ahead_from_behind() -> None:
     lopsided = BLOB + np.array([0.4, 0.0])
     ahead, back = seen(lopsided, np.array([1.0, 0.0])), seen(lopsided, np.array([-1.0, 0.0]))
     assert np.abs(ahead - back).sum() > 0.5

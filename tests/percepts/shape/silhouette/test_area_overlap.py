@@ -35,7 +35,7 @@ def turned(mask: Mask, degrees: float, mirrored: bool) -> Mask:
 
 @settings(max_examples=40, deadline=None)
 @given(st.sampled_from(NAMES), st.floats(-179, 179), st.booleans())
-def test_a_turned_shape_lies_on_itself(name: str, degrees: float, mirrored: bool) -> None:
+def test_a_rotated_shape_overlaps_itself(name: str, degrees: float, mirrored: bool) -> None:
     own = area_map(ZOO[name])
     found = area_overlaps(area_map(turned(ZOO[name], degrees, mirrored)), own[None])
     assert found.similarity[0, int(mirrored)] > 0.97
@@ -43,7 +43,7 @@ def test_a_turned_shape_lies_on_itself(name: str, degrees: float, mirrored: bool
 
 @settings(max_examples=30, deadline=None)
 @given(st.floats(-179, 179), st.booleans())
-def test_the_rotation_is_told(degrees: float, mirrored: bool) -> None:
+def test_the_rotation_is_recovered(degrees: float, mirrored: bool) -> None:
     shape = np.zeros((90, 120), dtype=bool)
     shape[30:60, 10:110] = shape[60:85, 15:30] = shape[10:30, 70:80] = True
     found = area_overlaps(area_map(turned(shape, degrees, mirrored)), area_map(shape)[None])
@@ -67,7 +67,7 @@ def slow_overlap(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> tuple[float, flo
 
 @settings(max_examples=30, deadline=None)
 @given(st.sampled_from(NAMES), st.sampled_from(NAMES))
-def test_overlaps_are_those_of_a_slow_search(first: str, second: str) -> None:
+def test_overlaps_equal_those_of_a_brute_force_search(first: str, second: str) -> None:
     a, b = area_map(ZOO[first]), area_map(ZOO[second])
     assert a.shape == (RINGS, ANGLES)
     found = area_overlaps(a, b[None]).similarity[0]
@@ -75,7 +75,7 @@ def test_overlaps_are_those_of_a_slow_search(first: str, second: str) -> None:
     assert found == pytest.approx(slow_overlap(a, b), abs=0.01)
 
 
-def test_an_index_of_many_is_that_of_each() -> None:
+def test_an_index_of_many_equals_single_indices() -> None:
     maps = np.stack([area_map(ZOO[n]) for n in NAMES])
     index = AreaIndex(maps)
     every = index.overlaps(maps[2])
@@ -87,7 +87,7 @@ def test_an_index_of_many_is_that_of_each() -> None:
 
 @settings(max_examples=40, deadline=None)
 @given(st.integers(1, 12), st.integers(10, 40))
-def test_a_gap_is_bridged_when_it_is_narrow(gap: int, thick: int) -> None:
+def test_only_a_narrow_gap_is_bridged(gap: int, thick: int) -> None:
     """Two blocks are one when the gap is at most a fifth of the square root of the area; and only then."""
     mask = np.zeros((60, 140), dtype=np.uint8)
     mask[10 : 10 + thick, 10:60] = mask[10 : 10 + thick, 60 + gap : 110 + gap] = 1
@@ -102,7 +102,7 @@ def test_a_gap_is_bridged_when_it_is_narrow(gap: int, thick: int) -> None:
 
 @settings(max_examples=40, deadline=None)
 @given(st.integers(0, 10_000))
-def test_what_is_joined_is_one_part_and_keeps_what_was_there(seed: int) -> None:
+def test_joined_fragments_are_one_part_with_all_their_pixels(seed: int) -> None:
     noise = np.random.default_rng(seed).normal(size=(80, 80))
     mask = (cv2.GaussianBlur(noise, (0, 0), 3) > 0.02).astype(np.uint8)
     found = join_fragments(mask)
@@ -114,10 +114,10 @@ def test_what_is_joined_is_one_part_and_keeps_what_was_there(seed: int) -> None:
         assert found[labels == island].all() or not found[labels == island].any()
 
 
-def test_a_whole_mask_stays_as_it_is() -> None:
+def test_a_connected_mask_is_unchanged() -> None:
     for mask in ZOO.values():
         assert (join_fragments(mask.astype(np.uint8)) == mask).all()
 
 
-def test_nothing_joins_to_nothing() -> None:
+def test_an_empty_mask_stays_empty() -> None:
     assert not join_fragments(np.zeros((5, 5), dtype=np.uint8)).any()

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tests.percepts.shape.shapes import ZOO, shape
 from visup.percepts.shape.silhouette._height_functions_jit import (
-    aligned,
+    alignment_cost,
     best_diagonals,
     point_costs,
 )
@@ -63,7 +63,7 @@ def slow_alignment(costs: Floats, diagonal: int, band: int, skip: float) -> floa
     return min(ways.values()) / count
 
 
-def test_heights_are_what_they_are_defined_as() -> None:
+def test_heights_equal_their_definition() -> None:
     for name in NAMES:
         contour = shape(ZOO[name]).contour
         slow = slow_heights(resample_closed(np.asarray(contour, float), count=POINTS))
@@ -72,10 +72,10 @@ def test_heights_are_what_they_are_defined_as() -> None:
 
 @settings(max_examples=30, deadline=None)
 @given(st.integers(0, 999), st.integers(8, 20), st.integers(0, 7), st.integers(1, 3))
-def test_alignment_finds_the_best_way(seed: int, count: int, diagonal: int, band: int) -> None:
+def test_alignment_finds_the_cheapest_path(seed: int, count: int, diagonal: int, band: int) -> None:
     costs = random_costs(seed, count)
     lanes = np.empty((3, 2 * band + 1), np.float32)
-    found = aligned(costs, diagonal, band, 0.2, lanes)
+    found = alignment_cost(costs, diagonal, band, 0.2, lanes)
     assert abs(found - slow_alignment(costs, diagonal, band, 0.2)) < 1e-5
 
 
@@ -99,7 +99,7 @@ def test_costs_are_root_mean_squares() -> None:
     np.testing.assert_allclose(costs, slow, rtol=1e-5)
 
 
-def test_where_an_outline_begins_and_its_mirror_image_make_no_difference() -> None:
+def test_distance_is_invariant_to_starting_point_and_mirroring() -> None:
     own = np.stack([outline_heights(shape(ZOO[n]).contour) for n in NAMES])
     turned, mirrored = np.roll(own, 17, axis=1), own[:, ::-1, ::-1]
     assert outline_distances(own, turned)[:, 0].max() < 1e-5
