@@ -71,14 +71,8 @@ from visup.percepts.motion.output.region_report import (
 )
 from visup.percepts.motion.output.segmentation_trace import SegmentationTrace
 from visup.percepts.motion.static_camera.static_segmenter import StaticCameraSegmenter
+from visup.percepts.motion.tracks import lifecycle
 from visup.percepts.motion.tracks.id_allocator import IdAllocator
-from visup.percepts.motion.tracks.lifecycle import (
-    ConfirmContext,
-    confirm,
-    delete,
-    initiate,
-    update_tracks,
-)
 from visup.percepts.motion.tracks.measurements import (
     BaselineMotion,
     FrameMeasurements,
@@ -192,8 +186,10 @@ class MotionSegmenter:
         tracks = self._updated(tracks, scene, evidence, labelling)
         ground = scene.measured[0].background.models[-1]
         self._sway = self._sway.after(ground.shift((image.shape[1] / 2, image.shape[0] / 2)))
-        asked = ConfirmContext(tracks_to_look_at(directives, tracks, scene), self._sway.in_place)
-        tracks = self._tracks = confirm(tracks, scene, self._ids, self.settings, asked)
+        asked = lifecycle.ConfirmContext(
+            tracks_to_look_at(directives, tracks, scene), self._sway.in_place
+        )
+        tracks = self._tracks = lifecycle.confirm(tracks, scene, self._ids, self.settings, asked)
         self._follow_foreground(scene, shown, TrackPosterior(tracks, keys, labelling.posterior))
         regions = self._report(scene, tracks)
         moving = motion_evidence(scene, labelling.winner, evidence)
@@ -250,7 +246,7 @@ class MotionSegmenter:
         self, known: Tracks, scene: FrameMeasurements, prior: Floats
     ) -> tuple[Tracks, Floats]:
         """The tracks with new ones added, and the label priors of all."""
-        tracks = initiate(known, scene, self.settings, self._last_key)
+        tracks = lifecycle.initiate(known, scene, self.settings, self._last_key)
         self._note_keys(tracks)
         # Without new tracks the prior is unchanged.
         return tracks, prior if tracks == known else label_priors(tracks, scene.cells)
@@ -292,13 +288,15 @@ class MotionSegmenter:
     ) -> Tracks:
         """The tracks updated from the labels; parts merged, occluded ones split, lost ones deleted."""
         winner = labelling.winner
-        tracks = update_tracks(tracks, scene, labelling, evidence.likelihood, self.settings)
+        tracks = lifecycle.update_tracks(
+            tracks, scene, labelling, evidence.likelihood, self.settings
+        )
         tracks = update_salience(tracks, scene, winner)
         tracks = assign_unknown(tracks, scene, winner, self.settings, self._last_key)
         self._note_keys(tracks)
         tracks = split_occluded(tracks, scene, winner)
         tracks = merge_tracks(tracks, scene, winner, self.settings)
-        return delete(tracks, scene, self.settings)
+        return lifecycle.delete(tracks, scene, self.settings)
 
     def _measure(
         self, image: WorkImage, before: Superpixels
