@@ -186,10 +186,9 @@ class MotionSegmenter:
         tracks = self._updated(tracks, scene, evidence, labelling)
         ground = scene.measured[0].background.models[-1]
         self._sway = self._sway.after(ground.shift((image.shape[1] / 2, image.shape[0] / 2)))
-        asked = lifecycle.ConfirmContext(
-            tracks_to_look_at(directives, tracks, scene), self._sway.in_place
-        )
-        tracks = self._tracks = lifecycle.confirm(tracks, scene, self._ids, self.settings, asked)
+        requested = tracks_to_look_at(directives, tracks, scene)
+        context = lifecycle.ConfirmContext(requested, self._sway.in_place)
+        tracks = self._tracks = lifecycle.confirm(tracks, scene, self._ids, self.settings, context)
         self._follow_foreground(scene, shown, TrackPosterior(tracks, keys, labelling.posterior))
         regions = self._report(scene, tracks)
         moving = motion_evidence(scene, labelling.winner, evidence)
@@ -287,16 +286,14 @@ class MotionSegmenter:
         labelling: Labelling,
     ) -> Tracks:
         """The tracks updated from the labels; parts merged, occluded ones split, lost ones deleted."""
-        winner = labelling.winner
-        tracks = lifecycle.update_tracks(
-            tracks, scene, labelling, evidence.likelihood, self.settings
-        )
+        winner, settings = labelling.winner, self.settings
+        tracks = lifecycle.update_tracks(tracks, scene, labelling, evidence.likelihood, settings)
         tracks = update_salience(tracks, scene, winner)
-        tracks = assign_unknown(tracks, scene, winner, self.settings, self._last_key)
+        tracks = assign_unknown(tracks, scene, winner, settings, self._last_key)
         self._note_keys(tracks)
         tracks = split_occluded(tracks, scene, winner)
-        tracks = merge_tracks(tracks, scene, winner, self.settings)
-        return lifecycle.delete(tracks, scene, self.settings)
+        tracks = merge_tracks(tracks, scene, winner, settings)
+        return lifecycle.delete(tracks, scene, settings)
 
     def _measure(
         self, image: WorkImage, before: Superpixels
