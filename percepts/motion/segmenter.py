@@ -264,11 +264,9 @@ class MotionSegmenter:
 
         Also the foreground cues from flow, where they are needed: they are computed in parallel.
         """
-        near = claimable_cells(scene, tracks, prior)
+        near, noise = claimable_cells(scene, tracks, prior), self.settings.noise
         old = self._history.back(scene.measured[-1].constraints.lag)
-        dense = self._executor.submit(
-            dense_likelihood, scene, tracks, old, near, self.settings.noise
-        )
+        dense = self._executor.submit(dense_likelihood, scene, tracks, old, near, noise)
         last, memory = self._history.back(1), self._foreground.memory
         shown = self._executor.submit(flow_cues, scene, last, memory) if self._uses_model else None
         evidence = point_likelihoods(scene, tracks, near, self.settings)
