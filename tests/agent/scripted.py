@@ -60,7 +60,7 @@ def counting(mind: Mind, observation: Observation) -> Outcome:
     return Outcome(mind.remember(COUNTING, count), (event,))
 
 
-def worried_while(holds: Callable[[float], bool]) -> Callable[[Mind, Observation], Outcome]:
+def alert_while(holds: Callable[[float], bool]) -> Callable[[Mind, Observation], Outcome]:
     """A reasoner with one concern while a predicate of time holds."""
 
     def think(mind: Mind, observation: Observation) -> Outcome:

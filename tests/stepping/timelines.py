@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tests.agent.scripted import Scripted, counting, frames, worried_while
+from tests.agent.scripted import Scripted, alert_while, counting, frames
 from visup.agent import Directive, Mind, Observation, Outcome
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.step import Step
@@ -49,7 +49,7 @@ def asking(mind: Mind, observation: Observation) -> Outcome:
 def plain_agent() -> Agent:
     """Counts, is worried for a while, and sees what it was asked for."""
     reasoners = Reasoners(
-        update=(counting,), cogitate=(worried_while(lambda t: 1.0 <= t < 2.5),), match=(asking,)
+        update=(counting,), cogitate=(alert_while(lambda t: 1.0 <= t < 2.5),), match=(asking,)
     )
     return Agent([Scripted("eye", ("x",), lambda i: (i * 7) % 5)], reasoners)
 

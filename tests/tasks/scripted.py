@@ -53,7 +53,7 @@ REGION = Region(
 
 
 @dataclass(frozen=True)
-class Spell:
+class RelationSpan:
     """A relation that is true from one time to another; `objects` in any order."""
 
     name: str
@@ -71,7 +71,7 @@ class Script:
     `gaps` gives the pixels between the arm and the satellite at each time, NaN where nobody knows.
     """
 
-    spells: Sequence[Spell] = ()
+    spans: Sequence[RelationSpan] = ()
     objects: Mapping[int, tuple[float, float]] = field(
         default_factory=lambda: {ARM: (0.0, 1e9), SATELLITE: (0.0, 1e9)}
     )
@@ -91,11 +91,11 @@ class Script:
     )
 
     @cached_property
-    def told(self) -> Mapping[tuple[str, frozenset[int]], Sequence[Spell]]:
+    def spans_of_relation(self) -> Mapping[tuple[str, frozenset[int]], Sequence[RelationSpan]]:
         """The spells of each relation between the same objects."""
-        found: dict[tuple[str, frozenset[int]], list[Spell]] = {}
-        for spell in self.spells:
-            found.setdefault((spell.name, frozenset(spell.objects)), []).append(spell)
+        found: dict[tuple[str, frozenset[int]], list[RelationSpan]] = {}
+        for span in self.spans:
+            found.setdefault((span.name, frozenset(span.objects)), []).append(span)
         return found
 
 
@@ -171,18 +171,18 @@ def _never(name: str, pair: tuple[int, int]) -> Relation:
 
 
 def _relation(script: Script, name: str, pair: tuple[int, int], time: float) -> Relation:
-    mine = script.told.get((name, frozenset(pair)))
-    if mine is None:
+    spans = script.spans_of_relation.get((name, frozenset(pair)))
+    if spans is None:
         return _never(name, pair)
-    for spell in mine:
-        if spell.from_s <= time < spell.to_s:
-            return Relation(name, pair, spell.truth, spell.from_s, spell.confidence)
-    ended = [s.to_s for s in mine if s.to_s <= time]
+    for span in spans:
+        if span.from_s <= time < span.to_s:
+            return Relation(name, pair, span.truth, span.from_s, span.confidence)
+    ended = [s.to_s for s in spans if s.to_s <= time]
     return Relation(name, pair, Truth.FALSE, max(ended, default=0.0))
 
 
 @dataclass(frozen=True)
-class Played:
+class ScriptedRun:
     """What a reasoner made of a script: its minds and all it told."""
 
     minds: tuple[Mind, ...]
@@ -199,11 +199,11 @@ class Played:
     def at(self, time: float) -> Mind:
         return next(m for m in self.minds if m.time >= time - 1e-9)
 
-    def told(self) -> list[tuple[str, str]]:
+    def reported(self) -> list[tuple[str, str]]:
         return [(e.kind, str(e.data.get("stage", ""))) for e in self.events]
 
 
-def play(reasoner: Reasoner, script: Script, until: float, fps: float = FPS) -> Played:
+def play(reasoner: Reasoner, script: Script, until: float, fps: float = FPS) -> ScriptedRun:
     """Let a reasoner live through a script."""
     mind, minds, outcomes = Mind(), [], []
     for index in range(round(until * fps) + 1):
@@ -213,14 +213,14 @@ def play(reasoner: Reasoner, script: Script, until: float, fps: float = FPS) -> 
         mind = outcome.mind
         minds.append(mind)
         outcomes.append(outcome)
-    return Played(tuple(minds), tuple(outcomes))
+    return ScriptedRun(tuple(minds), tuple(outcomes))
 
 
-def watch(script: Script, until: float, text: str = "", fps: float = FPS) -> Played:
+def watch(script: Script, until: float, text: str = "", fps: float = FPS) -> ScriptedRun:
     """The play of a task, that of docking unless another is given."""
     return play(task_reasoner([parse_task(text) if text else DOCK]), script, until, fps)
 
 
-def task_of(played: Played, time: float | None = None) -> TaskBelief:
+def task_of(played: ScriptedRun, time: float | None = None) -> TaskBelief:
     """What is believed of the only task, at the end or at a time."""
     return (played.last if time is None else played.at(time)).tasks[0]

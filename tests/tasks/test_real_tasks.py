@@ -9,7 +9,7 @@ from math import inf
 import pytest
 
 from tests.paths import ROOT
-from tests.tasks.scripted import Script, Spell, play, task_of
+from tests.tasks.scripted import RelationSpan, Script, play, task_of
 from visup.agent import Verdict
 from visup.tasks import parse_task
 from visup.tasks.grammar.structure import task_actors
@@ -50,18 +50,18 @@ def played(trace: Trace) -> Verdict:
     waited = (a for a in task_actors(task) if not task.actor(a).spare)
     names = dict.fromkeys((*waited, *(w for *_, who in said for w in who)))
     number = {n: k for k, n in enumerate(names, 1)}
-    spells, leaves = [], dict.fromkeys(number, 1e9)
+    spans, leaves = [], dict.fromkeys(number, 1e9)
     for begin, end, action, who in said:
         if action == "gone":
             leaves[who[0]] = begin
             continue
         pair = (number[who[0]], number[who[1]])
-        spells.append(Spell(action, begin + 0.6 * (action == "coupled"), end, pair))
+        spans.append(RelationSpan(action, begin + 0.6 * (action == "coupled"), end, pair))
         if action == "coupled":  # what is coupled touches, a little before
-            spells.append(Spell("touching", begin, end, pair))
+            spans.append(RelationSpan("touching", begin, end, pair))
     last = max([e for b, e, *_ in said if e < inf] + [b for b, *_ in said])
     script = Script(
-        tuple(spells),
+        tuple(spans),
         objects={number[n]: (0.0, leaves[n]) for n in number},
         identities={k: {next(iter(task.models(n)), n): 0.9} for n, k in number.items()},
     )

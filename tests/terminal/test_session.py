@@ -8,7 +8,7 @@ import pytest
 from rich.console import Console
 from typer.testing import CliRunner
 
-from tests.agent.scripted import Scripted, counting, frames, worried_while
+from tests.agent.scripted import Scripted, alert_while, counting, frames
 from tests.stepping.timelines import SETTINGS, STRANGER, suspicious_agent
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import SettingsError
@@ -26,7 +26,7 @@ from visup.terminal.session_commands import COMMANDS, HELP
 
 def session(count: int = 30) -> tuple[Session, io.StringIO]:
     out = io.StringIO()
-    reasoners = Reasoners(update=(counting,), cogitate=(worried_while(lambda t: t > 1.0),))
+    reasoners = Reasoners(update=(counting,), cogitate=(alert_while(lambda t: t > 1.0),))
     agent = Agent([Scripted("eye", ("x",))], reasoners)
     return Session(agent, frames(count), Console(file=out, width=80)), out
 

@@ -2,35 +2,37 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from tests.agent.scripted import COUNTING, Scripted, counting, exploding_at, frames, worried_while
+from tests.agent.scripted import COUNTING, Scripted, alert_while, counting, exploding_at, frames
 from visup.agent import Directive, Mind, Observation, Outcome, Severity
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.step import Step
 from visup.agent.storage.jsonable import to_jsonable
 
 
-def told(steps: list[Step]) -> list[object]:
+def summary(steps: list[Step]) -> list[object]:
     return [to_jsonable(replace(s, observation=Observation(0, 0, (0, 0)))) for s in steps]
 
 
-def make() -> Agent:
-    reasoners = Reasoners(update=(counting,), cogitate=(worried_while(lambda t: 0.3 <= t < 0.6),))
+def counting_agent() -> Agent:
+    reasoners = Reasoners(update=(counting,), cogitate=(alert_while(lambda t: 0.3 <= t < 0.6),))
     return Agent([Scripted("eye", ("x",))], reasoners)
 
 
 def test_the_same_frames_give_the_same_steps() -> None:
-    assert told(list(make().steps(frames(30)))) == told(list(make().steps(frames(30))))
+    assert summary(list(counting_agent().steps(frames(30)))) == summary(
+        list(counting_agent().steps(frames(30)))
+    )
 
 
 def test_two_agents_share_no_state() -> None:
-    a, b = make(), make()
-    alone = told(list(make().steps(frames(20))))
+    a, b = counting_agent(), counting_agent()
+    alone = summary(list(counting_agent().steps(frames(20))))
     mixed = [(a.step(f), b.step(f)) for f in frames(20)]
-    assert told([s for s, _ in mixed]) == told([s for _, s in mixed]) == alone
+    assert summary([s for s, _ in mixed]) == summary([s for _, s in mixed]) == alone
 
 
 def test_a_run_stops_at_its_condition_and_continues_from_there() -> None:
-    agent, source = make(), frames(10)
+    agent, source = counting_agent(), frames(10)
     first = agent.run(source, until=lambda s: s.frame_index == 3)
     then = agent.run(source)
     assert first is not None
@@ -41,7 +43,7 @@ def test_a_run_stops_at_its_condition_and_continues_from_there() -> None:
 
 
 def test_a_run_over_no_frames_gives_no_step() -> None:
-    assert make().run(frames(0)) is None
+    assert counting_agent().run(frames(0)) is None
 
 
 def test_a_reasoner_that_raises_leaves_the_mind_unchanged_and_opens_an_alert() -> None:
@@ -58,7 +60,7 @@ def test_a_reasoner_that_raises_leaves_the_mind_unchanged_and_opens_an_alert() -
 
 
 def test_an_open_alert_stays_open_in_a_step_whose_reasoning_failed() -> None:
-    always = worried_while(lambda _: True)
+    always = alert_while(lambda _: True)
     blown = [exploding_at(i) for i in range(5, 40)]
     agent = Agent([], Reasoners(cogitate=(always, *blown)))
     last = agent.run(frames(40))
@@ -91,7 +93,7 @@ def test_a_failed_behaviour_opens_an_alert() -> None:
 
 def test_observers_receive_every_step_with_an_immutable_mind() -> None:
     kept: list[Mind] = []
-    agent = make()
+    agent = counting_agent()
     agent.observers = (lambda step, frame: kept.append(step.mind),)
     agent.run(frames(5))
     assert [m.recall(COUNTING) for m in kept] == [1, 2, 3, 4, 5]

@@ -9,7 +9,7 @@ from visup.agent.cycle.alerts import CLOSING_DELAY_S, RECOVERY_S, update_alerts
 STEP_S = 0.25
 
 
-def concern(kind: str) -> AlertCondition:
+def condition(kind: str) -> AlertCondition:
     return AlertCondition(kind, (1, 2), Severity.WARNING, f"{kind}.")
 
 
@@ -23,7 +23,7 @@ def test_alerts_open_renew_and_close(history: list[set[str]]) -> None:
         now = i * STEP_S
         last |= dict.fromkeys(kinds, now)
         alerts, opened, closed = update_alerts(
-            alerts, [concern(k) for k in sorted(kinds)], now, len(ids) + 1
+            alerts, [condition(k) for k in sorted(kinds)], now, len(ids) + 1
         )
         ids += [a.id for a in opened]
         expected = {k for k, t in last.items() if now - t <= CLOSING_DELAY_S}
@@ -45,7 +45,7 @@ def test_equal_conditions_open_one_alert_of_the_greater_severity() -> None:
 @given(st.lists(st.booleans(), min_size=1, max_size=60), st.sampled_from(["region", "lamp"]))
 def test_alerts_stay_open_while_a_needed_kind_is_unknown(blind: list[bool], kind: str) -> None:
     """Its concern held once; then it closes as soon as sight has been back for long enough."""
-    alerts, _, _ = update_alerts((), [concern("a")], 0.0, 1)
+    alerts, _, _ = update_alerts((), [condition("a")], 0.0, 1)
     last_blind = float("-inf")
     for i, unknown in enumerate(blind, start=1):
         now = i * STEP_S

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from tests.agent.scripted import COUNTING, Scripted, counting, frames, worried_while
+from tests.agent.scripted import COUNTING, Scripted, alert_while, counting, frames
 from visup.agent import Event, Mind, Observation, Outcome
 from visup.agent.cycle.agent import Agent, Reasoners
 
@@ -30,18 +30,18 @@ NONSENSE: dict[str, Callable[[Mind], Any]] = {
 }
 
 
-def exits(mind: Mind) -> Any:
+def raising_exit(mind: Mind) -> Any:
     raise SystemExit(2)
 
 
 @pytest.mark.parametrize("what", [*NONSENSE, "exit"])
 def test_an_invalid_outcome_leaves_the_mind_unchanged(what: str) -> None:
-    says = NONSENSE.get(what, exits)
+    says = NONSENSE.get(what, raising_exit)
 
     def think(mind: Mind, observation: Observation) -> Any:
         return says(mind) if observation.frame_index == 3 else Outcome(mind)
 
-    always = worried_while(lambda _: True)
+    always = alert_while(lambda _: True)
     agent = Agent([Scripted("eye", ("x",))], Reasoners((counting,), (always, think)))
     steps = list(agent.steps(frames(6)))
     before, hit = steps[2].mind, steps[3].mind

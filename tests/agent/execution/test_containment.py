@@ -23,7 +23,7 @@ from visup.agent.model.step import Step
 from visup.percepts.motion.behaviour import MotionBehaviour
 
 
-class Plug:
+class FunctionBehaviour:
     """A behaviour that calls a function of frame and observation."""
 
     def __init__(self, does: Callable[[Frame, Observation], Any], **declared: Any) -> None:
@@ -37,20 +37,20 @@ class Plug:
         return [] if said is None else [self.contract.percept(frame, said)]
 
 
-def reports(plug: Plug, limits: Limits, count: int, fps: float = 10.0) -> list[Report]:
+def reports(plug: FunctionBehaviour, limits: Limits, count: int, fps: float = 10.0) -> list[Report]:
     return [s.reports[0] for s in Agent([plug], limits=limits).steps(frames(count, fps))]
 
 
-def at(index: int, does: Callable[[], Any]) -> Callable[[Frame, Observation], Any]:
+def on_frame(index: int, does: Callable[[], Any]) -> Callable[[Frame, Observation], Any]:
     return lambda frame, seen: does() if frame.index == index else frame.index
 
 
-def spin() -> None:
+def loop_forever() -> None:
     while True:
         pass
 
 
-def leave() -> None:
+def exit_process() -> None:
     raise SystemExit(3)
 
 
@@ -63,19 +63,19 @@ class Unreadable(Exception):
         raise RuntimeError
 
 
-def unreadable() -> None:
+def raise_unprintable() -> None:
     raise Unreadable
 
 
-@pytest.mark.parametrize("does", [spin, lambda: time.sleep(0.6)])
+@pytest.mark.parametrize("does", [loop_forever, lambda: time.sleep(0.6)])
 def test_a_hang_costs_its_limit_once_and_the_step_continues(does: Callable[[], Any]) -> None:
     before = threading.active_count()
     begin = time.monotonic()
-    told = reports(Plug(at(1, does)), Limits(hang_s=0.2), 40)
+    found = reports(FunctionBehaviour(on_frame(1, does)), Limits(hang_s=0.2), 40)
     assert time.monotonic() - begin < 5.0
-    assert [r.state for r in told[:2]] == [ReportState.RAN, ReportState.LATE]
-    assert told[1].error == "it gave no answer within 200 ms"
-    assert all(r.state is not ReportState.RAN for r in told[1:11])
+    assert [r.state for r in found[:2]] == [ReportState.RAN, ReportState.LATE]
+    assert found[1].error == "it gave no answer within 200 ms"
+    assert all(r.state is not ReportState.RAN for r in found[1:11])
     deadline = time.monotonic() + 10
     while threading.active_count() > before and time.monotonic() < deadline:
         time.sleep(0.02)
@@ -83,30 +83,30 @@ def test_a_hang_costs_its_limit_once_and_the_step_continues(does: Callable[[], A
 
 
 def test_a_behaviour_that_recovers_from_a_hang_runs_again() -> None:
-    told = reports(Plug(at(1, spin)), Limits(hang_s=0.2), 40)
-    assert told[-1].state is ReportState.RAN
-    assert told[-1].percepts[0].value == 39
+    found = reports(FunctionBehaviour(on_frame(1, loop_forever)), Limits(hang_s=0.2), 40)
+    assert found[-1].state is ReportState.RAN
+    assert found[-1].percepts[0].value == 39
 
 
 @pytest.mark.parametrize(
     ("does", "said"),
     [
-        (leave, "it called for an exit (SystemExit)"),
+        (exit_process, "it called for an exit (SystemExit)"),
         (interrupt, "it called for an exit (KeyboardInterrupt)"),
-        (unreadable, "Unreadable: (its message cannot be read)"),
+        (raise_unprintable, "Unreadable: (its message cannot be read)"),
     ],
 )
 def test_an_exit_of_a_plug_in_does_not_end_the_supervisor(
     does: Callable[[], Any], said: str
 ) -> None:
-    told = reports(Plug(at(1, does)), Limits(), 4)
-    assert [r.state for r in told] == [ReportState.RAN, ReportState.FAILED] + [ReportState.RAN] * 2
-    assert said in told[1].error
+    found = reports(FunctionBehaviour(on_frame(1, does)), Limits(), 4)
+    assert [r.state for r in found] == [ReportState.RAN, ReportState.FAILED] + [ReportState.RAN] * 2
+    assert said in found[1].error
 
 
 def test_an_exit_is_contained_in_the_thread_of_the_caller_too() -> None:
-    told = reports(Plug(at(1, leave)), Limits(hang_s=None), 4)
-    assert [r.state.value for r in told] == ["ran", "failed", "ran", "ran"]
+    found = reports(FunctionBehaviour(on_frame(1, exit_process)), Limits(hang_s=None), 4)
+    assert [r.state.value for r in found] == ["ran", "failed", "ran", "ran"]
 
 
 def test_percepts_are_the_same_with_and_without_threads() -> None:
@@ -121,8 +121,8 @@ def test_percepts_are_the_same_with_and_without_threads() -> None:
 def test_without_budgets_no_decision_depends_on_time() -> None:
     ticks = iter(range(0, 10**6, 1000))  # a clock by which every run takes for ever
     limits = Limits(hang_s=None, clock=lambda: float(next(ticks)))
-    told = reports(Plug(lambda f, s: f.index, cost_ms=1.0), limits, 10)
-    assert {r.state for r in told} == {ReportState.RAN}
+    found = reports(FunctionBehaviour(lambda f, s: f.index, cost_ms=1.0), limits, 10)
+    assert {r.state for r in found} == {ReportState.RAN}
 
 
 def test_a_contract_may_extend_the_hang_limit_except_live() -> None:
@@ -145,13 +145,15 @@ def test_a_run_over_budget_is_late_and_repeated_ones_suspend() -> None:
         return frame.index
 
     limits = Limits(hang_s=None, budgets=True, clock=lambda: now[0])
-    told = reports(Plug(slow, cost_ms=40.0), limits, 8)
-    assert [r.state for r in told[:FAILURES_BEFORE_SUSPENSION]] == [
+    found = reports(FunctionBehaviour(slow, cost_ms=40.0), limits, 8)
+    assert [r.state for r in found[:FAILURES_BEFORE_SUSPENSION]] == [
         ReportState.LATE
     ] * FAILURES_BEFORE_SUSPENSION
-    assert {r.state for r in told[FAILURES_BEFORE_SUSPENSION:]} == {ReportState.SUSPENDED}
-    assert told[0].error == "it took longer than its budget of 40 ms"
-    assert {r.state for r in reports(Plug(slow, cost_ms=60.0), limits, 8)} == {ReportState.RAN}
+    assert {r.state for r in found[FAILURES_BEFORE_SUSPENSION:]} == {ReportState.SUSPENDED}
+    assert found[0].error == "it took longer than its budget of 40 ms"
+    assert {r.state for r in reports(FunctionBehaviour(slow, cost_ms=60.0), limits, 8)} == {
+        ReportState.RAN
+    }
 
 
 def test_kinds_of_a_failed_behaviour_stay_unknown_until_it_has_run_again() -> None:
@@ -160,7 +162,7 @@ def test_kinds_of_a_failed_behaviour_stay_unknown_until_it_has_run_again() -> No
             raise ValueError("no light")
         return frame.index
 
-    slots = ordered_slots([Plug(fails, every_s=0.5)])
+    slots = ordered_slots([FunctionBehaviour(fails, every_s=0.5)])
     seen = [perceive(slots, frame, ()) for frame in frames(12)]
     assert ["x" in s.unknown for s in seen] == [5 <= i < 10 for i in range(12)]
     assert [s.reports[0].state for s in seen[:2]] == [ReportState.RAN, ReportState.RESTED]
@@ -198,12 +200,12 @@ def test_retained_memory_exceeds_the_limit() -> None:
         kept.append(block)
         return frame.index
 
-    told = reports(Plug(hoard, memory_mb=30.0), Limits(), 12)
+    found = reports(FunctionBehaviour(hoard, memory_mb=30.0), Limits(), 12)
     kept.clear()
-    first = next(i for i, r in enumerate(told) if r.state is ReportState.FAILED)
+    first = next(i for i, r in enumerate(found) if r.state is ReportState.FAILED)
     assert 3 <= first <= 6
-    assert "grow by more than 30 MB" in told[first].error
-    assert told[first + 1].state is ReportState.SUSPENDED
+    assert "grow by more than 30 MB" in found[first].error
+    assert found[first + 1].state is ReportState.SUSPENDED
 
 
 def test_memory_freed_by_others_does_not_offset_growth() -> None:
@@ -216,9 +218,9 @@ def test_memory_freed_by_others_does_not_offset_growth() -> None:
             kept.append(np.ones(40 * 2**20, np.uint8))
         return frame.index
 
-    told = reports(Plug(hoard, memory_mb=30.0), Limits(), 2)
-    assert told[0].state is ReportState.RAN
-    assert told[1].state is ReportState.FAILED
+    found = reports(FunctionBehaviour(hoard, memory_mb=30.0), Limits(), 2)
+    assert found[0].state is ReportState.RAN
+    assert found[1].state is ReportState.FAILED
 
 
 def test_a_frame_cannot_be_written_to() -> None:
@@ -226,9 +228,9 @@ def test_a_frame_cannot_be_written_to() -> None:
         frame.image[:] = 0
 
     given = list(frames(3))
-    agent = Agent([Plug(scribble)])
-    told = [agent.step(frame).reports[0] for frame in given]
-    assert all("read-only" in r.error for r in told)
+    agent = Agent([FunctionBehaviour(scribble)])
+    found = [agent.step(frame).reports[0] for frame in given]
+    assert all("read-only" in r.error for r in found)
     assert [int(f.image[0, 0, 0]) for f in given] == [0, 1, 2]
 
 
@@ -237,21 +239,21 @@ def test_the_past_has_the_requested_length_and_is_private() -> None:
         assert all(p.observation.frame_index == p.frame.index for p in observation.past)
         return [p.frame.index for p in observation.past]
 
-    steps = list(Agent([Plug(past, history=2)]).steps(frames(4)))
+    steps = list(Agent([FunctionBehaviour(past, history=2)]).steps(frames(4)))
     assert [s.observation.of("x")[0] for s in steps] == [[], [0], [0, 1], [1, 2]]
     assert all(s.observation.past == () for s in steps)
 
 
 def test_a_clock_set_back_delays_no_behaviour() -> None:
     image = np.zeros((4, 6, 3), np.uint8)
-    slots = ordered_slots([Plug(lambda f, s: f.index, every_s=10.0)])
+    slots = ordered_slots([FunctionBehaviour(lambda f, s: f.index, every_s=10.0)])
     times = [100.0, 101.0, 3.0]
     states = [perceive(slots, Frame(i, t, image), ()).reports[0].state for i, t in enumerate(times)]
     assert states == [ReportState.RAN, ReportState.RESTED, ReportState.RAN]
 
 
 def test_the_method_start_is_called_once_before_the_first_run() -> None:
-    class Opened(Plug):
+    class Opened(FunctionBehaviour):
         opened = 0
 
         def start(self) -> None:
@@ -263,7 +265,7 @@ def test_the_method_start_is_called_once_before_the_first_run() -> None:
 
 
 def test_a_start_that_fails_is_tried_again() -> None:
-    class Reluctant(Plug):
+    class Reluctant(FunctionBehaviour):
         tries = 0
 
         def start(self) -> None:
@@ -271,6 +273,6 @@ def test_a_start_that_fails_is_tried_again() -> None:
             if self.tries < 3:
                 raise OSError("the device is busy")
 
-    told = reports(Reluctant(lambda f, s: f.index), Limits(), 4)
-    assert [r.state.value for r in told] == ["failed", "failed", "ran", "ran"]
-    assert told[0].error == "OSError: the device is busy"
+    found = reports(Reluctant(lambda f, s: f.index), Limits(), 4)
+    assert [r.state.value for r in found] == ["failed", "failed", "ran", "ran"]
+    assert found[0].error == "OSError: the device is busy"

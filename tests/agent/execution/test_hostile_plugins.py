@@ -55,7 +55,7 @@ class Plug:
 """
 
 
-def plug(folder: Path, body: str, top: str = "") -> IsolatedBehaviour:
+def isolated_behaviour(folder: Path, body: str, top: str = "") -> IsolatedBehaviour:
     """A behaviour that does something on each frame, and something when its file is imported."""
     lines = "".join(f"        {line}\n" for line in body.strip().split("\n"))
     path = folder / "plug.py"
@@ -115,14 +115,14 @@ def test_contracts_and_errors_equal_those_of_an_import(tmp_path: Path) -> None:
 def test_the_file_of_a_plug_in_is_not_imported_by_the_supervisor(tmp_path: Path) -> None:
     mark = tmp_path / "pids"
     top = f"import os\nopen({str(mark)!r}, 'a').write(os.readlink('/proc/self') + '\\n')\n"
-    told = reports(plug(tmp_path, "return 1", top))
+    told = reports(isolated_behaviour(tmp_path, "return 1", top))
     assert told[-1].state is ReportState.RAN
     assert str(os.getpid()) not in mark.read_text().split()
 
 
 def test_reports_of_a_process_cannot_execute_code(tmp_path: Path) -> None:
     body = "return type('Evil', (), {'__reduce__': lambda self: (os.abort, ())})()"
-    told = reports(plug(tmp_path, body))
+    told = reports(isolated_behaviour(tmp_path, body))
     assert {r.state for r in told} == {ReportState.FAILED}
 
 
@@ -150,7 +150,7 @@ def test_reports_of_a_process_cannot_execute_code(tmp_path: Path) -> None:
 def test_invalid_messages_are_a_failure_and_do_not_block(
     tmp_path: Path, body: str, said: str
 ) -> None:
-    behaviour = plug(tmp_path, body)
+    behaviour = isolated_behaviour(tmp_path, body)
     begin = time.monotonic()
     told = reports(behaviour, limits=SHORT if "no answer" in said else PATIENT)
     assert time.monotonic() - begin < LIMITS.start_s + 5 * HANG_S
@@ -160,7 +160,9 @@ def test_invalid_messages_are_a_failure_and_do_not_block(
 
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="no bounds of memory here")
 def test_shared_memory_is_limited_too(tmp_path: Path) -> None:
-    taken = reports(plug(tmp_path, "import mmap\nmmap.mmap(-1, 2**40)\nreturn 1"), 1, PATIENT)
+    taken = reports(
+        isolated_behaviour(tmp_path, "import mmap\nmmap.mmap(-1, 2**40)\nreturn 1"), 1, PATIENT
+    )
     assert taken[0].state is ReportState.FAILED
     assert "memory" in taken[0].error
 
@@ -175,7 +177,9 @@ def test_a_plug_in_cannot_signal_the_supervisor(tmp_path: Path) -> None:
     got: list[int] = []
     before = signal.signal(signal.SIGUSR1, lambda number, frame: got.append(number))
     try:
-        told = reports(plug(tmp_path, "os.kill(supervisor(), signal.SIGUSR1)\nreturn 1"))
+        told = reports(
+            isolated_behaviour(tmp_path, "os.kill(supervisor(), signal.SIGUSR1)\nreturn 1")
+        )
     finally:
         signal.signal(signal.SIGUSR1, before)
     assert told[0].state is ReportState.FAILED
@@ -184,7 +188,9 @@ def test_a_plug_in_cannot_signal_the_supervisor(tmp_path: Path) -> None:
 
 @needs_namespaces
 def test_a_plug_in_cannot_read_the_memory_of_the_supervisor(tmp_path: Path) -> None:
-    told = reports(plug(tmp_path, "open(f'/proc/{supervisor()}/mem', 'r+b')\nreturn 1"))
+    told = reports(
+        isolated_behaviour(tmp_path, "open(f'/proc/{supervisor()}/mem', 'r+b')\nreturn 1")
+    )
     assert "PermissionError" in told[0].error
 
 
@@ -213,7 +219,7 @@ def test_children_of_a_plug_in_end_with_it(tmp_path: Path) -> None:
         "    except OSError:\n"
         "        return False\n"
     )
-    agent = Agent([plug(tmp_path, LEFTOVER, top)], limits=LIMITS)
+    agent = Agent([isolated_behaviour(tmp_path, LEFTOVER, top)], limits=LIMITS)
     pids = agent.step(next(frames(1))).observation.of("x")[0]
     assert len(pids) >= 2
     assert all(map(alive, pids))
@@ -224,4 +230,4 @@ def test_children_of_a_plug_in_end_with_it(tmp_path: Path) -> None:
 @pytest.mark.skipif(os.geteuid() == 0, reason="the system does not count the processes of root")
 def test_a_plug_in_cannot_fork_without_limit(tmp_path: Path) -> None:
     body = "for n in range(3000):\n    if os.fork() == 0:\n        time.sleep(60)\nreturn n"
-    assert "BlockingIOError" in reports(plug(tmp_path, body), 1, PATIENT)[0].error
+    assert "BlockingIOError" in reports(isolated_behaviour(tmp_path, body), 1, PATIENT)[0].error

@@ -56,16 +56,16 @@ def process_id() -> int:
     return int(Path("/proc/self").readlink().name)
 
 
-def spin(frame: Frame) -> None:
+def loop_forever(frame: Frame) -> None:
     while True:
         pass
 
 
-def hoard(frame: Frame) -> None:
+def allocate_memory(frame: Frame) -> None:
     np.ones(256 * 2**20, np.uint8)
 
 
-def scribble(frame: Frame) -> None:
+def write_to_image(frame: Frame) -> None:
     frame.image[:] = 0
 
 
@@ -74,25 +74,25 @@ def unsendable(frame: Frame) -> None:
 
 
 DOES: dict[str, Callable[[Frame], Any]] = {
-    "spin": spin,
+    "spin": loop_forever,
     "sleep": lambda frame: time.sleep(60),
     "exit": lambda frame: sys.exit(3),
     "end": lambda frame: os._exit(3),
     "crash": lambda frame: ctypes.string_at(0),
     "kill": lambda frame: os.kill(os.getpid(), signal.SIGKILL),
-    "hoard": hoard,
-    "scribble": scribble,
+    "hoard": allocate_memory,
+    "scribble": write_to_image,
     "odd": unsendable,
 }
 
 
-def numbered(mind: Any, observation: Observation) -> Outcome:
+def event_of_frame(mind: Any, observation: Observation) -> Outcome:
     wish = Directive("look_at", "Look.", MappingProxyType({"n": observation.frame_index}))
     return Outcome(mind, directives=(wish,))
 
 
-def watch(behaviour: Any, count: int, limits: Limits = LIMITS) -> list[Step]:
-    agent = Agent([behaviour], Reasoners(cogitate=(numbered,)), limits=limits)
+def steps_of(behaviour: Any, count: int, limits: Limits = LIMITS) -> list[Step]:
+    agent = Agent([behaviour], Reasoners(cogitate=(event_of_frame,)), limits=limits)
     try:
         return list(agent.steps(frames(count)))
     finally:
@@ -104,10 +104,10 @@ def counts(steps: list[Step]) -> list[Any]:
 
 
 def test_percepts_are_the_same_in_another_process() -> None:
-    apart, here = watch(Alone(), 6), watch(Alone(), 6, Limits(in_process=True))
-    assert counts(apart) == counts(here)
-    assert counts(here)[3] == [4, 3 * 6 * 4 * 3, [1, 2], [2]]
-    assert {v for s in apart for v in s.observation.of("pid")}.isdisjoint({os.getpid()})
+    isolated, in_process = steps_of(Alone(), 6), steps_of(Alone(), 6, Limits(in_process=True))
+    assert counts(isolated) == counts(in_process)
+    assert counts(in_process)[3] == [4, 3 * 6 * 4 * 3, [1, 2], [2]]
+    assert {v for s in isolated for v in s.observation.of("pid")}.isdisjoint({os.getpid()})
 
 
 @pytest.mark.parametrize(
@@ -124,7 +124,7 @@ def test_percepts_are_the_same_in_another_process() -> None:
 def test_a_broken_process_is_reported_and_replaced(
     does: str, state: ReportState, said: str
 ) -> None:
-    steps = watch(Alone(does), 16)
+    steps = steps_of(Alone(does), 16)
     told = [s.reports[0] for s in steps]
     assert told[2].state is state
     assert said in told[2].error
@@ -138,7 +138,7 @@ def test_a_broken_process_is_reported_and_replaced(
     ("does", "said"), [("exit", "it called for an exit"), ("scribble", "read-only"), ("odd", "Odd")]
 )
 def test_an_exception_does_not_end_the_process(does: str, said: str) -> None:
-    steps = watch(Alone(does), 5)
+    steps = steps_of(Alone(does), 5)
     assert said in steps[2].reports[0].error
     assert [c[0] for c in counts(steps)] == [1, 2, 4, 5]
 
@@ -217,11 +217,11 @@ def test_unsendable_attributes_are_refused_with_a_hint() -> None:
     with pytest.raises(BehaviourError, match="cannot be sent to a process") as caught:
         Agent([Holding("made")], limits=LIMITS)
     assert "`start`" in str(caught.value)
-    assert counts(watch(Holding("started"), 2))[-1][0] == 2
+    assert counts(steps_of(Holding("started"), 2))[-1][0] == 2
 
 
 def test_a_failed_start_is_reported() -> None:
-    told = [s.reports[0] for s in watch(Holding("never"), 2)]
+    told = [s.reports[0] for s in steps_of(Holding("never"), 2)]
     assert {r.state for r in told} == {ReportState.FAILED}
     assert told[0].error.endswith("it does not start: OSError: no device")
 
@@ -237,7 +237,7 @@ def test_a_behaviour_of_a_file_can_be_isolated_by_name(tmp_path: Path) -> None:
         "        yield self.contract.percept(frame, {'pid': Path('/proc/self').readlink().name})\n"
     )
     (lamp,) = load_behaviours(str(path))
-    steps = watch(lamp, 2, Limits(isolate=frozenset({"lamp"})))
+    steps = steps_of(lamp, 2, Limits(isolate=frozenset({"lamp"})))
     assert steps[-1].reports[0].error == ""
     assert steps[-1].observation.of("lamp")[0]["pid"] != str(os.getpid())
 
@@ -249,4 +249,4 @@ def test_a_name_that_is_not_there_cannot_be_isolated() -> None:
 
 def test_isolation_works_without_namespaces(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sandbox, "can_use_namespaces", lambda: False)
-    assert counts(watch(Alone(), 2))[-1][0] == 2
+    assert counts(steps_of(Alone(), 2))[-1][0] == 2

@@ -32,7 +32,7 @@ EYE = Contract("eye", gives=("region", "hypothesis", "depth", "health", "own"), 
 NAN, INF = float("nan"), float("inf")
 
 
-def judge(value: object, kind: str = "own", **changes: Any) -> None:
+def check_own_value(value: object, kind: str = "own", **changes: Any) -> None:
     percept = replace(EYE.percept(FRAME, value, kind=kind), **changes)
     check_percepts(EYE, collect_percepts(EYE, [percept]), FRAME)
 
@@ -73,7 +73,7 @@ def test_other_values_than_percepts_are_refused(said: object, message: str) -> N
 )
 def test_a_percept_with_a_wrong_field_is_refused(changes: dict[str, Any]) -> None:
     with pytest.raises(BehaviourError):
-        judge(1, **changes)
+        check_own_value(1, **changes)
 
 
 @pytest.mark.parametrize(
@@ -103,9 +103,9 @@ def test_a_percept_with_a_wrong_field_is_refused(changes: dict[str, Any]) -> Non
     ],
 )
 def test_a_region_with_a_wrong_field_is_refused(changes: dict[str, Any]) -> None:
-    judge(REGION, "region")
+    check_own_value(REGION, "region")
     with pytest.raises(BehaviourError):
-        judge(replace(REGION, **changes), "region")
+        check_own_value(replace(REGION, **changes), "region")
 
 
 @pytest.mark.parametrize(
@@ -127,7 +127,7 @@ def test_a_region_with_a_wrong_field_is_refused(changes: dict[str, Any]) -> None
 )
 def test_a_value_of_a_wrong_type_for_its_kind_is_refused(kind: str, value: object) -> None:
     with pytest.raises(BehaviourError):
-        judge(value, kind)
+        check_own_value(value, kind)
 
 
 def test_one_id_for_two_regions_is_refused() -> None:
@@ -161,38 +161,38 @@ plain = st.recursive(
 def test_non_finite_numbers_in_nested_values_are_refused(value: Any, bad: Any) -> None:
     finite = "inf" not in repr(value)
     if finite:
-        judge(value)
+        check_own_value(value)
     for wrapped in ([value, bad], {"a": {"b": bad}}, (value, [Reading(bad)])):
         with pytest.raises(BehaviourError):
-            judge(wrapped)
+            check_own_value(wrapped)
 
 
 def test_masked_arrays_may_hold_missing_values() -> None:
-    judge(np.ma.masked_invalid(np.array([[1.0, NAN]])))
+    check_own_value(np.ma.masked_invalid(np.array([[1.0, NAN]])))
     with pytest.raises(BehaviourError):
-        judge(np.array([[1.0, NAN]]))
+        check_own_value(np.array([[1.0, NAN]]))
     with pytest.raises(BehaviourError, match="array of object"):
-        judge(np.array([None, 3], dtype=object))
+        check_own_value(np.array([None, 3], dtype=object))
 
 
 @pytest.mark.parametrize("value", [int, len, (n for n in "ab"), object(), {"a": [lambda: 0]}])
 def test_values_that_are_not_data_are_refused(value: object) -> None:
     with pytest.raises(BehaviourError, match="expected: numbers, text, arrays"):
-        judge(value)
+        check_own_value(value)
 
 
 def test_a_recursive_value_is_refused() -> None:
     endless: list[Any] = []
     endless.append(endless)
     with pytest.raises(BehaviourError, match="nested too deep"):
-        judge(endless)
+        check_own_value(endless)
 
 
 @given(st.binary(max_size=8) | st.floats() | st.complex_numbers() | st.dates() | plain)
 def test_any_field_value_is_accepted_or_refused_with_a_message(junk: Any) -> None:
     for field in ("id", "bbox", "centroid", "area", "confidence", "contour", "motion"):
         try:
-            judge(replace(REGION, **{field: junk}), "region")
+            check_own_value(replace(REGION, **{field: junk}), "region")
         except BehaviourError as refused:
             assert refused.expected  # noqa: PT017 - acceptance is an outcome too
         else:
@@ -201,7 +201,7 @@ def test_any_field_value_is_accepted_or_refused_with_a_message(junk: Any) -> Non
 
 def test_messages_about_any_value_are_short() -> None:
     with pytest.raises(BehaviourError) as caught:
-        judge(1, kind="x" * 10_000)
+        check_own_value(1, kind="x" * 10_000)
     assert len(str(caught.value)) < 300
 
 

@@ -15,8 +15,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.agent.scripted import COUNTING, Scripted, counting, frames, worried_while
-from tests.agent.storage.test_codec import plugin_values, regions, same
+from tests.agent.scripted import COUNTING, Scripted, alert_while, counting, frames
+from tests.agent.storage.test_codec import equal_values, plugin_values, regions
 from visup.agent import Health, HealthStatus, Region
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import OutputError
@@ -29,7 +29,7 @@ from visup.tasks.grammar.conditions import Name, PartName
 @settings(max_examples=40)
 @given(st.lists(regions(), max_size=2), plugin_values)
 def test_a_loaded_state_equals_the_saved_one(given_regions: list[Region], value: Any) -> None:
-    assert same(load_state(dump_state([given_regions, value])), [given_regions, value])
+    assert equal_values(load_state(dump_state([given_regions, value])), [given_regions, value])
 
 
 def test_shared_references_are_preserved() -> None:
@@ -140,8 +140,8 @@ class Summing:
         self.total = state["total"]
 
 
-def made() -> Agent:
-    worry = worried_while(lambda t: t % 3 < 1.5)
+def counting_agent() -> Agent:
+    worry = alert_while(lambda t: t % 3 < 1.5)
     return Agent([Summing()], Reasoners(update=(counting,), cogitate=(worry,)))
 
 
@@ -149,9 +149,9 @@ def made() -> Agent:
 @settings(max_examples=15)
 def test_an_agent_with_a_loaded_state_continues_identically(at: int) -> None:
     sequence = list(frames(60))
-    first = made()
+    first = counting_agent()
     first.run(sequence[:at])
-    second = made()
+    second = counting_agent()
     assert second.load(load_state(dump_state(first.save())))
     for frame in sequence[at:]:
         a, b = first.step(frame), second.step(frame)

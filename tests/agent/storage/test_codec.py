@@ -97,13 +97,13 @@ plugin_values = st.recursive(
 )
 
 
-def seen_of(*values: tuple[str, Any]) -> Observation:
+def observation_of(*values: tuple[str, Any]) -> Observation:
     percepts = tuple(Percept(kind, value, 1.25, "eye", 0.5) for kind, value in values)
     report = Report("eye", ReportState.RAN, tuple({k for k, _ in values}), percepts)
     return Observation(7, 1.25, (640, 480), (report, Report("ear", ReportState.FAILED, ("x",))))
 
 
-def same(a: Any, b: Any) -> bool:
+def equal_values(a: Any, b: Any) -> bool:
     """Equal in type and to the last bit, arrays too."""
     if type(a) is not type(b):
         return False
@@ -111,11 +111,11 @@ def same(a: Any, b: Any) -> bool:
         return bool(a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes())
     if dataclasses.is_dataclass(a):
         names = [f.name for f in dataclasses.fields(a)]
-        return all(same(getattr(a, n), getattr(b, n)) for n in names)
+        return all(equal_values(getattr(a, n), getattr(b, n)) for n in names)
     if isinstance(a, tuple | list):
-        return len(a) == len(b) and all(map(same, a, b))
+        return len(a) == len(b) and all(map(equal_values, a, b))
     if isinstance(a, dict):
-        return list(a) == list(b) and all(same(a[k], b[k]) for k in a)
+        return list(a) == list(b) and all(equal_values(a[k], b[k]) for k in a)
     if isinstance(a, float):
         return a == b and math.copysign(1.0, a) == math.copysign(1.0, b)
     return bool(a == b)
@@ -127,15 +127,15 @@ def test_regions_and_hypotheses_round_trip(
     given_regions: list[Region], given_hypotheses: list[Hypothesis]
 ) -> None:
     values = [("region", r) for r in given_regions] + [("hypothesis", h) for h in given_hypotheses]
-    seen = seen_of(*values)
-    assert same(unpack_observation(pack_observation(seen)), seen)
+    seen = observation_of(*values)
+    assert equal_values(unpack_observation(pack_observation(seen)), seen)
 
 
 @settings(max_examples=80)
 @given(plugin_values)
 def test_plain_values_of_plug_ins_round_trip(value: Any) -> None:
-    seen = seen_of(("own", value))
-    assert same(unpack_observation(pack_observation(seen)), seen)
+    seen = observation_of(("own", value))
+    assert equal_values(unpack_observation(pack_observation(seen)), seen)
 
 
 @pytest.mark.parametrize(
@@ -154,7 +154,7 @@ def test_plain_values_of_plug_ins_round_trip(value: Any) -> None:
     ],
 )
 def test_records_and_arrays_round_trip(value: Any) -> None:
-    assert same(decode(json.loads(json.dumps(encode(value)))), value)
+    assert equal_values(decode(json.loads(json.dumps(encode(value)))), value)
 
 
 def test_a_read_only_mapping_round_trips() -> None:
@@ -210,7 +210,7 @@ def test_chain_codes_encode_contours(
     chain = chain_by_hand(contour.tolist())
     assert contour_to_chain(contour) == chain
     if chain is not None:
-        assert same(chain_to_contour(chain), contour)
+        assert equal_values(chain_to_contour(chain), contour)
 
 
 @pytest.mark.parametrize("lengths", [[3], [5, -1], [[2, 2]], [2**62, 2**62], ["a"], [1.5, 2.5]])
@@ -224,7 +224,7 @@ class Strange:
 
 
 def test_kinds_of_a_value_that_cannot_be_encoded_are_unobserved() -> None:
-    back = unpack_observation(pack_observation(seen_of(("own", Strange()), ("other", 1))))
+    back = unpack_observation(pack_observation(observation_of(("own", Strange()), ("other", 1))))
     assert back.reports[0].state is ReportState.RESTED
     assert "Strange" in back.reports[0].error
     assert not back.observed("own")
@@ -244,11 +244,11 @@ REGION = Region(
 @settings(max_examples=150)
 @given(st.data())
 def test_damaged_bytes_raise_no_other_errors(data: st.DataObject) -> None:
-    good = pack_observation(seen_of(("region", REGION), ("own", {"a": (1, b"x")})))
+    good = pack_observation(observation_of(("region", REGION), ("own", {"a": (1, b"x")})))
     at = data.draw(st.integers(0, len(good) - 1))
     bad = good[:at] + data.draw(st.binary(max_size=3)) + good[at + 1 :]
     with suppress(OutputError):
-        assert same(unpack_observation(bad), unpack_observation(good))
+        assert equal_values(unpack_observation(bad), unpack_observation(good))
 
 
 json_values = st.recursive(
@@ -296,5 +296,5 @@ def test_every_document_conforms_to_the_schema(
     from visup.agent.storage.schema import StepDocument
 
     values = [("region", r) for r in found] + [("hypothesis", one), ("own", own)]
-    text = json.dumps(to_document(seen_of(*values)))
+    text = json.dumps(to_document(observation_of(*values)))
     StepDocument.model_validate_json(text)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.agent.scripted import Scripted, counting, frames, worried_while
+from tests.agent.scripted import Scripted, alert_while, counting, frames
 from tests.paths import ROOT
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import OutputError
@@ -36,7 +36,7 @@ for frame in frames(100):
 
 def run(path: Path, count: int) -> None:
     journal = Journal(path)
-    worry = worried_while(lambda t: t >= 0.5)
+    worry = alert_while(lambda t: t >= 0.5)
     reasoners = Reasoners(update=(counting,), cogitate=(worry,))
     Agent([Scripted("eye", ("x",))], reasoners, observers=(journal.record,)).run(frames(count))
     journal.note(verdict="succeeded")

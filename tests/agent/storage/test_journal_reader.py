@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.agent.scripted import Scripted, counting, frames, worried_while
+from tests.agent.scripted import Scripted, alert_while, counting, frames
 from tests.full_disk import no_room
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.errors import OutputError
@@ -23,7 +23,7 @@ SMALL = JournalLimits(segment_bytes=4000)
 
 
 def agent(*observers: object) -> Agent:
-    worry = worried_while(lambda t: t >= 0.5)
+    worry = alert_while(lambda t: t >= 0.5)
     reasoners = Reasoners(update=(counting,), cogitate=(worry,))
     return Agent([Scripted("eye", ("x",))], reasoners, observers=observers)  # type: ignore[arg-type]
 

@@ -78,39 +78,39 @@ def test_other_tables_are_refused_before_they_are_read(run: Path, statements: tu
 Change = Callable[[dict[str, Any]], Any]
 
 
-def first(document: dict[str, Any]) -> dict[str, Any]:
+def first_value(document: dict[str, Any]) -> dict[str, Any]:
     found: dict[str, Any] = document["reports"][0]["percepts"][0][1]
     return found
 
 
 CHANGES: dict[str, Change] = {
-    "a box of 20 gigabytes": lambda d: first(d).update(
+    "a box of 20 gigabytes": lambda d: first_value(d).update(
         bbox=[0, 0, 200_000, 100_000], mask=[20_000_000_000]
     ),
-    "a box of negative size": lambda d: first(d).update(bbox=[0, 0, -5, -5], mask=[25]),
+    "a box of negative size": lambda d: first_value(d).update(bbox=[0, 0, -5, -5], mask=[25]),
     "masks that are too much together": lambda d: d["reports"][0].update(
         percepts=[
-            ["region", {**first(d), "id": n, "bbox": [0, 0, 4000, 4000], "mask": [16_000_000]}, 0.0,
+            ["region", {**first_value(d), "id": n, "bbox": [0, 0, 4000, 4000], "mask": [16_000_000]}, 0.0,
              "eye", 1.0]
             for n in range(100)
         ]
     ),
-    "runs that are no numbers": lambda d: first(d).update(mask=["x"]),
-    "a chain that is none": lambda d: first(d)["contour"].update(of="9" * 10),
-    "a chain from nowhere": lambda d: first(d)["contour"].update({"from": [10**30, 0]}),
-    "an array of objects": lambda d: first(d).update(
+    "runs that are no numbers": lambda d: first_value(d).update(mask=["x"]),
+    "a chain that is none": lambda d: first_value(d)["contour"].update(of="9" * 10),
+    "a chain from nowhere": lambda d: first_value(d)["contour"].update({"from": [10**30, 0]}),
+    "an array of objects": lambda d: first_value(d).update(
         contour={"$": "array", "dtype": "|O", "shape": [1], "of": "AAAAAAAAAAA="}
     ),
-    "an array larger than its bytes": lambda d: first(d).update(
+    "an array larger than its bytes": lambda d: first_value(d).update(
         contour={"$": "array", "dtype": "<f4", "shape": [10**12, 2], "of": ""}
     ),
     "a region that is a number": lambda d: d["reports"][0]["percepts"][0].__setitem__(1, 5),
-    "a region outside of the frame": lambda d: first(d).update(bbox=[100, 100, 2, 2]),
+    "a region outside of the frame": lambda d: first_value(d).update(bbox=[100, 100, 2, 2]),
     "a frame without end": lambda d: d.update(frame_size=[10**9, 10**9]),
     "a time that is none": lambda d: d.update(time="NaN"),
     "confidence of two": lambda d: d["reports"][0]["percepts"][0].__setitem__(4, 2.0),
-    "a record of another kind": lambda d: first(d).update({"$": "Observation"}),
-    "too many fields": lambda d: first(d).update(more=1),
+    "a record of another kind": lambda d: first_value(d).update({"$": "Observation"}),
+    "too many fields": lambda d: first_value(d).update(more=1),
     "nested without end": lambda d: d["reports"][0]["percepts"][0].__setitem__(
         1, json.loads("[" * 150 + "]" * 150)
     ),

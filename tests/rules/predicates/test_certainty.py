@@ -27,12 +27,12 @@ def mind_of(*boxes: Rect, frames: int = 40) -> Mind:
     return reason(seen(i, regions) for i in range(frames))[-1].mind
 
 
-def yes(mind: Mind, codes: Codes) -> set[int]:
+def ids_of_yes(mind: Mind, codes: Codes) -> set[int]:
     return {i for i, c in zip(Snapshot(mind).ids, codes.tolist(), strict=True) if c == YES}
 
 
-def alone(mind: Mind) -> set[int]:
-    return yes(mind, standalone(Snapshot(mind)))
+def standalone_ids(mind: Mind) -> set[int]:
+    return ids_of_yes(mind, standalone(Snapshot(mind)))
 
 
 @given(st.floats(60.0, 150.0), st.sampled_from(("left", "above")))
@@ -40,21 +40,21 @@ def test_a_large_isolated_region_is_standalone(gap: float, side: str) -> None:
     other = (
         (200.0 - gap - 40, 300.0, 40.0, 40.0) if side == "left" else (250.0, 300 - gap - 40, 40, 40)
     )
-    assert alone(mind_of((200, 300, 150, 120), other, frames=20)) == {1, 2}
+    assert standalone_ids(mind_of((200, 300, 150, 120), other, frames=20)) == {1, 2}
 
 
 def test_a_small_region_near_a_large_one_is_not_standalone() -> None:
     beside = mind_of((200, 300, 150, 120), (352, 330, 40, 40))
-    assert 2 not in alone(beside)
-    assert 1 in alone(beside)
+    assert 2 not in standalone_ids(beside)
+    assert 1 in standalone_ids(beside)
 
 
 def test_neighbours_of_similar_size_are_standalone() -> None:
-    assert alone(mind_of((200, 200, 100, 80), (303, 200, 100, 80))) == {1, 2}
+    assert standalone_ids(mind_of((200, 200, 100, 80), (303, 200, 100, 80))) == {1, 2}
 
 
 def test_specks_are_not_standalone() -> None:
-    assert alone(mind_of((200, 200, 100, 80), (400, 100, 12, 12))) == {1}
+    assert standalone_ids(mind_of((200, 200, 100, 80), (400, 100, 12, 12))) == {1}
 
 
 @pytest.mark.parametrize(("confidence", "known"), [(0.8, True), (0.3, False)])
@@ -63,10 +63,10 @@ def test_an_object_is_identified_if_a_model_is_likelier_than_none(
 ) -> None:
     mind = mind_of((200, 200, 100, 80))
     belief = mind.objects[1]
-    assert yes(mind, identified(Snapshot(mind))) == set()
+    assert ids_of_yes(mind, identified(Snapshot(mind))) == set()
     candidates = (Candidate("arm", 3.0, 1.0, confidence),)
     mind = mind.with_objects(replace(belief, candidates=candidates, unknown=1 - confidence))
-    assert (yes(mind, identified(Snapshot(mind))) == {1}) == known
+    assert (ids_of_yes(mind, identified(Snapshot(mind))) == {1}) == known
 
 
 @pytest.mark.parametrize(
@@ -79,10 +79,10 @@ def test_a_machine_is_at_home_in_the_zone_where_it_started(
     mind = mind_of((200, 200, 100, 80))
     polygon = ((corner, 150), (corner + 200, 150), (corner + 200, 350), (corner, 350))
     mind = replace(mind, zones=(Zone(name, polygon),))
-    assert yes(mind, at_home(Snapshot(mind))) == home
+    assert ids_of_yes(mind, at_home(Snapshot(mind))) == home
 
 
-def shrunk(t: float) -> float:
+def shrinking_box(t: float) -> float:
     """Pixels that are no longer seen of a body by then."""
     return 145 * max(t - 1.6, 0.0)
 
@@ -100,11 +100,14 @@ def shrunk(t: float) -> float:
         (lambda t: (5, 200, 100 - 25 * t, 80), False),  # at the border, cut to its rest
         (lambda t: (100 * t - 90 if t < 1 else 300, 200, 100, 80), False),  # leaps
         (lambda t: (100 * t - 90, 200, 100, 80 if t < 1.5 else 20), False),  # the rest of something
-        (lambda t: (540, 60 + 80 * t, 100 - shrunk(t) / 3, 150 - shrunk(t)), False),  # its rest
+        (
+            lambda t: (540, 60 + 80 * t, 100 - shrinking_box(t) / 3, 150 - shrinking_box(t)),
+            False,
+        ),  # its rest
     ],
 )
 def test_an_object_came_in_if_it_crossed_the_border_as_a_whole(
     box: Callable[[float], Rect], comes: bool
 ) -> None:
     mind = reason(seen(i, [box_region(1, box(i / 25))]) for i in range(60))[-1].mind
-    assert yes(mind, came_in(Snapshot(mind))) == ({1} if comes else set())
+    assert ids_of_yes(mind, came_in(Snapshot(mind))) == ({1} if comes else set())

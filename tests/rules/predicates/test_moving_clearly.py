@@ -23,7 +23,7 @@ SIZE = (480, 360)
 MOTIONS = st.tuples(st.one_of(st.just(np.nan), st.floats(0.0, 300.0)), st.floats(0.0, 30.0))
 
 
-def pushed(speed: float) -> Mind:
+def pushed_box(speed: float) -> Mind:
     """A box that is pushed by so many pixels a frame from the twentieth frame on."""
 
     def box(frame: int) -> tuple[float, float, float, float]:
@@ -32,7 +32,7 @@ def pushed(speed: float) -> Mind:
     return list(reason(seen(i, [box_region(1, box(i))]) for i in range(FRAMES)))[-1].mind
 
 
-def covered(pace: float) -> list[Mind]:
+def occluded_box(pace: float) -> list[Mind]:
     """A box at rest before which another one passes, up to its middle."""
 
     def boxes(frame: int) -> list[Region | None]:
@@ -48,12 +48,12 @@ def covered(pace: float) -> list[Mind]:
 
 @pytest.mark.parametrize("speed", [3.0, -5.0])
 def test_a_pushed_body_clearly_moves(speed: float) -> None:
-    assert moving_clearly(Snapshot(pushed(speed))).tolist() == [YES]
+    assert moving_clearly(Snapshot(pushed_box(speed))).tolist() == [YES]
 
 
 @pytest.mark.parametrize("pace", [4.0, 9.0])
 def test_an_occluded_resting_body_does_not_clearly_move_for_long(pace: float) -> None:
-    facts = [f for f in map(Snapshot, covered(pace)) if 1 in f.row]
+    facts = [f for f in map(Snapshot, occluded_box(pace)) if 1 in f.row]
     assert len(facts) > 40
     clearly = [moving_clearly(f)[f.row[1]] == YES and f.one("speed")[f.row[1]] > 25 for f in facts]
     assert not any(all(clearly[k : k + 5]) for k in range(len(clearly) - 5))

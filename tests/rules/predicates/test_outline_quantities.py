@@ -37,18 +37,18 @@ def outlined(*contours: np.ndarray) -> Mind:
     return mind
 
 
-def asked(mind: Mind, name: str) -> np.ndarray:
+def quantity(mind: Mind, name: str) -> np.ndarray:
     return QUANTITIES[name].evaluate(Snapshot(mind))
 
 
 @given(st.floats(0.0, 179.0), st.floats(0.0, 179.0))
 def test_orientation_and_angle_of_bars_are_measured(a: float, b: float) -> None:
     mind = outlined(bar(a), bar(b))
-    found = asked(mind, "orientation")[0]
+    found = quantity(mind, "orientation")[0]
     assert np.allclose((found - [a, b] + 90) % 180, 90, atol=0.2)
     turn = abs(a - b)
     between = min(turn, 180 - turn)
-    assert asked(mind, "axis_angle")[:, 0, 1] == pytest.approx([between] * 2, abs=0.3)
+    assert quantity(mind, "axis_angle")[:, 0, 1] == pytest.approx([between] * 2, abs=0.3)
     truth = PREDICATES["aligned"].evaluate(Snapshot(mind))[0, 1]
     if between < 9.5 or between > 15.5:
         assert truth == (1 if between < 12 else -1)
@@ -58,17 +58,17 @@ def test_orientation_and_angle_of_bars_are_measured(a: float, b: float) -> None:
 
 def test_round_or_hidden_objects_have_no_orientation() -> None:
     mind = outlined(bar(30, 40, 40), bar(30))
-    assert asked(mind, "orientation")[:, 0].tolist() == [-inf, inf]
-    assert asked(mind, "axis_angle")[:, 0, 1].tolist() == [-inf, inf]
+    assert quantity(mind, "orientation")[:, 0].tolist() == [-inf, inf]
+    assert quantity(mind, "axis_angle")[:, 0, 1].tolist() == [-inf, inf]
     assert PREDICATES["aligned"].evaluate(Snapshot(mind))[0, 1] == 0
     hidden = mind.with_objects(replace(mind.objects[2], presence=Presence.HIDDEN))
-    assert asked(hidden, "orientation")[:, 1].tolist() == [-inf, inf]
-    assert asked(hidden, "openness")[:, 1].tolist() == [-inf, inf]
+    assert quantity(hidden, "orientation")[:, 1].tolist() == [-inf, inf]
+    assert quantity(hidden, "openness")[:, 1].tolist() == [-inf, inf]
 
 
 def test_open_jaws_have_greater_openness_than_closed_ones() -> None:
     mind = outlined(np.array(JAWS), np.array(CLOSED))
-    assert asked(mind, "openness")[0] == pytest.approx([0.5, 0.0], abs=0.01)
+    assert quantity(mind, "openness")[0] == pytest.approx([0.5, 0.0], abs=0.01)
 
 
 def test_adjacent_objects_share_an_outline() -> None:
@@ -76,9 +76,9 @@ def test_adjacent_objects_share_an_outline() -> None:
     beside = box_region(2, (160.0, 110.0, 40.0, 40.0))
     assert beside is not None
     mind = mind.with_objects(replace(mind.objects[2], region=beside))
-    found = asked(mind, "shared_outline")
+    found = quantity(mind, "shared_outline")
     assert found[:, 0, 1] == pytest.approx([0.29, 0.29], abs=0.05)
     assert found[:, 1, 0].tolist() == found[:, 0, 1].tolist()
     assert found[:, 0, 2].tolist() == [0.0, 0.0]
     hidden = mind.with_objects(replace(mind.objects[2], presence=Presence.HIDDEN))
-    assert asked(hidden, "shared_outline")[:, 0, 1].tolist() == [-inf, inf]
+    assert quantity(hidden, "shared_outline")[:, 0, 1].tolist() == [-inf, inf]

@@ -55,7 +55,7 @@ def mind(*drawn: tuple[tuple[int, int], tuple[int, int]]) -> Mind:
     )
 
 
-def told(facts: Snapshot, word: str, a: int, b: int) -> list[str]:
+def relations_that_hold(facts: Snapshot, word: str, a: int, b: int) -> list[str]:
     return [r for r in ALLEN_RELATIONS if PREDICATES[word].evaluate(facts, r)[a, b] == YES]
 
 
@@ -71,7 +71,7 @@ def test_exactly_one_allen_relation_holds_along_each_axis_and_they_compose(
     for axis, word in enumerate(("along_x", "along_y")):
         found = {}
         for i, j in permutations(range(3), 2):
-            (name,) = told(facts, word, i, j)
+            (name,) = relations_that_hold(facts, word, i, j)
             assert SIGNS[name] == allen(drawn[i][axis], drawn[j][axis])
             found[i, j] = SIGNS[name]
         for i, j, k in permutations(range(3), 3):
@@ -95,14 +95,14 @@ def test_tpcc_equals_its_definition_except_near_straight_lines(
     up = [(x, -y) for x, y in points]
     exact = tpcc(*up)
     near = {
-        tpcc(up[0], up[1], turned(up[1], up[2], s * STRAIGHT_DEG)) for s in (-1.01, 0, 1.01)
+        tpcc(up[0], up[1], rotated_about(up[1], up[2], s * STRAIGHT_DEG)) for s in (-1.01, 0, 1.01)
     } | {exact}
     assert found[0] in near or found[0][1:].startswith("s")
     if all(not r[1:].startswith("s") for r in near) and len(near) == 1:
         assert found[0] == exact
 
 
-def turned(
+def rotated_about(
     about: tuple[float, float], point: tuple[float, float], degrees: float
 ) -> tuple[float, float]:
     moved = complex(point[0] - about[0], point[1] - about[1]) * exp(1j * pi * degrees / 180)

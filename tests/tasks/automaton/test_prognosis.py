@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from tests.tasks.scripted import FPS, Played, Script, Spell, play
+from tests.tasks.scripted import FPS, RelationSpan, Script, ScriptedRun, play
 from visup.agent import TaskBelief, Verdict
 from visup.tasks import load_task, parse_task
 from visup.tasks.automaton.hidden_phases import hidden_filter
@@ -16,31 +16,33 @@ from visup.tasks.supervision.sentences import prospects_text
 from visup.tasks.supervision.supervise import task_reasoner
 
 FAILS = (
-    Spell("converging", 0.5, 12.3),
-    Spell("touching", 12.0, 12.8),
-    Spell("diverging", 12.8, 30),
+    RelationSpan("converging", 0.5, 12.3),
+    RelationSpan("touching", 12.0, 12.8),
+    RelationSpan("diverging", 12.8, 30),
 )
 SUCCEEDS = (
-    Spell("converging", 0.5, 12.3),
-    Spell("touching", 12.0, 30),
-    Spell("coupled", 13.0, 30),
+    RelationSpan("converging", 0.5, 12.3),
+    RelationSpan("touching", 12.0, 30),
+    RelationSpan("coupled", 13.0, 30),
 )
 
 
-def watch(*spells: Spell, until: float = 26.0, text: str = "", fps: float = FPS) -> Played:
+def watch(
+    *spans: RelationSpan, until: float = 26.0, text: str = "", fps: float = FPS
+) -> ScriptedRun:
     task = parse_task(text) if text else load_task("dock")
-    return play(task_reasoner([task]), Script(spells), until, fps)
+    return play(task_reasoner([task]), Script(spans), until, fps)
 
 
-def belief(played: Played, time: float) -> TaskBelief:
+def belief(played: ScriptedRun, time: float) -> TaskBelief:
     return played.at(time).tasks[0]
 
 
-@pytest.mark.parametrize("spells", [FAILS, SUCCEEDS])
+@pytest.mark.parametrize("spans", [FAILS, SUCCEEDS])
 def test_hypotheses_share_all_probability_and_what_is_told_is_a_marginal(
-    spells: tuple[Spell, ...],
+    spans: tuple[RelationSpan, ...],
 ) -> None:
-    played = watch(*spells)
+    played = watch(*spans)
     for mind in played.minds[3:]:
         weighted = mind.memory["tasks"][0].posterior.hypotheses.values()
         masses = [w.mass for w in weighted]
@@ -95,7 +97,7 @@ def test_what_comes_next_has_room_for_what_ends_well() -> None:
 def test_success_falls_with_a_failure_and_rises_towards_the_end() -> None:
     good, bad = watch(*SUCCEEDS), watch(*FAILS)
 
-    def hope(played: Played, time: float) -> float:
+    def hope(played: ScriptedRun, time: float) -> float:
         found = belief(played, time).success
         assert found is not None
         return found
@@ -109,9 +111,9 @@ def test_success_falls_with_a_failure_and_rises_towards_the_end() -> None:
 
 def test_what_was_told_done_is_taken_back_when_later_evidence_overturns_it() -> None:
     played = watch(
-        Spell("converging", 0.5, 5.0),
-        Spell("touching", 4.8, 5.3),  # a glimpse of a touch, and the approach goes on
-        Spell("converging", 6.0, 60.0),
+        RelationSpan("converging", 0.5, 5.0),
+        RelationSpan("touching", 4.8, 5.3),  # a glimpse of a touch, and the approach goes on
+        RelationSpan("converging", 6.0, 60.0),
         until=50.0,
     )
     assert belief(played, 8.0).current == "captured"

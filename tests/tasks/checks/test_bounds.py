@@ -20,26 +20,29 @@ from visup.tasks.tools.outline import outline
 ACTIONS = ("converging", "touching", "diverging")
 
 
-def chained(count: int) -> str:
+def sequential_stages(count: int) -> str:
     lines = [f"<s{i}> ::= {ACTIONS[i % 3]}(a, b) <s{i + 1}>" for i in range(count)]
     return "\n".join([*lines, f"<s{count}> ::= {ACTIONS[count % 3]}(a, b)"])
 
 
-def beside(count: int, form: str) -> str:
+def parallel_actions(count: int, form: str) -> str:
     return "<t> ::= " + "\n & ".join(f"({form.format(n)})" for n in range(count))
 
 
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (chained(3000), "3001 stages"),
-        (chained(DEEPEST_STAGES), "inside one another"),
+        (sequential_stages(3000), "3001 stages"),
+        (sequential_stages(DEEPEST_STAGES), "inside one another"),
         (
             "\n".join(f"<s{n}> ::= <s{n + 1}>" for n in range(1500)) + "\n<s1500> ::= seen(a)",
             "inside",
         ),
-        (beside(25, "converging(a, b{0}) | touching(a, b{0})"), "25 things at the same time"),
-        (beside(10, "converging(a, b{0}) | touching(a, b{0})"), "1024 ways"),
+        (
+            parallel_actions(25, "converging(a, b{0}) | touching(a, b{0})"),
+            "25 things at the same time",
+        ),
+        (parallel_actions(10, "converging(a, b{0}) | touching(a, b{0})"), "1024 ways"),
         ("<t> ::= " + " ".join(f"convergin{n}(a, b)" for n in range(5000)), "characters"),
         ("<t> ::= " + "\n".join(f"<s{n}>" for n in range(90_000)), "characters"),
         ("<t> ::= " + "(" * 3000 + "seen(a)" + ")" * 3000, "too deep|60 deep|characters"),
@@ -64,13 +67,13 @@ def test_many_mistakes_give_a_bounded_report() -> None:
 @settings(max_examples=20, deadline=None)
 @given(
     st.one_of(
-        st.integers(1, DEEPEST_STAGES - 1).map(chained),
+        st.integers(1, DEEPEST_STAGES - 1).map(sequential_stages),
         st.tuples(
             st.integers(2, 8),
             st.sampled_from(
                 ["converging(a, b{0}) | touching(a, b{0})", "seen(b{0}) touching(a, b{0})"]
             ),
-        ).map(lambda t: beside(*t)),
+        ).map(lambda t: parallel_actions(*t)),
     )
 )
 def test_accepted_tasks_can_be_supervised_drawn_and_formatted(text: str) -> None:

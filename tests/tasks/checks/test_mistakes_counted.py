@@ -23,7 +23,7 @@ from visup.tasks.checks.diagnose import diagnose
 
 
 @dataclass(frozen=True)
-class Told:
+class Message:
     """What is said of a mistake."""
 
     text: str
@@ -33,27 +33,27 @@ class Told:
 
 
 @cache  # several tests tell of the same texts
-def of_rules(text: str) -> list[Told]:
+def rule_messages(text: str) -> list[Message]:
     found = []
     for e in errors_of(text):
         assert isinstance(e.where, SourceLocation)
-        found.append(Told(str(e), e.where, e.expected, e.hint))
+        found.append(Message(str(e), e.where, e.expected, e.hint))
     return found
 
 
 @cache
-def of_tasks(text: str) -> list[Told]:
-    return [Told(str(f), f.place, f.expected, f.hint) for f in diagnose(text, "my.task")[1]]
+def task_messages(text: str) -> list[Message]:
+    return [Message(str(f), f.place, f.expected, f.hint) for f in diagnose(text, "my.task")[1]]
 
 
-def fixes(text: str, told: Sequence[Told]) -> Iterator[TextFix]:
+def fixes(text: str, told: Sequence[Message]) -> Iterator[TextFix]:
     for one in told:
         fix = fix_of(text, one.place, one.hint)
         if fix is not None:
             yield fix
 
 
-def mended(text: str, read: Callable[[str], list[Told]]) -> bool:
+def fixed(text: str, read: Callable[[str], list[Message]]) -> bool:
     """Whether taking up hints, one after the other, makes a text legal."""
     told = read(text)
     if not told or not all("^" in t.text and (t.expected or t.hint) for t in told):
@@ -68,9 +68,11 @@ def mended(text: str, read: Callable[[str], list[Told]]) -> bool:
 
 
 def test_hints_fix_95_percent_of_the_counted_mistakes() -> None:
-    rules = {c: mended(rule(c), of_rules) for c in CONDITIONS}
-    rules |= {r: mended(r, of_rules) for r in WHOLE_RULES}
-    stages = {s: mended(f"<t> ::= <a> <b>\n{s}\n<b> ::= coupled(x, y)", of_tasks) for s in STAGES}
+    rules = {c: fixed(rule(c), rule_messages) for c in CONDITIONS}
+    rules |= {r: fixed(r, rule_messages) for r in WHOLE_RULES}
+    stages = {
+        s: fixed(f"<t> ::= <a> <b>\n{s}\n<b> ::= coupled(x, y)", task_messages) for s in STAGES
+    }
     missed = [text for text, well in {**rules, **stages}.items() if not well]
     alone = len(rules) + len(stages)
     assert len(missed) <= 0.08 * alone, missed

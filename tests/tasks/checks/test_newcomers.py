@@ -5,25 +5,25 @@
 
 import pytest
 
-from tests.tasks.checks.mistakes.counted import account_of
+from tests.tasks.checks.mistakes.counted import outcome_of
 from tests.tasks.checks.mistakes.pairs import SETS, pairs, pointings
-from tests.tasks.checks.test_mistakes_counted import fixes, of_tasks
+from tests.tasks.checks.test_mistakes_counted import fixes, task_messages
 
 ONE_IN = 4
 
 
 @pytest.mark.parametrize("name", SETS)
 def test_hints_fix_nearly_all_mistakes_of_newcomers_mostly_as_intended(name: str) -> None:
-    some = [(t, slip) for t in (False, True) for slip in [*pairs(name, t)][::ONE_IN]]
-    found = [a for t, slip in some if (a := account_of(slip, t)) is not None]
-    assert all(one.told for one in found)
+    some = [(t, mutation) for t in (False, True) for mutation in [*pairs(name, t)][::ONE_IN]]
+    found = [a for t, mutation in some if (a := outcome_of(mutation, t)) is not None]
+    assert all(one.complete for one in found)
     assert sum(one.legal for one in found) >= 0.9 * len(found)
     assert sum(one.restored for one in found) >= 0.6 * len(found)
 
 
 def test_carets_mark_the_cause_of_95_percent_of_newcomers_mistakes() -> None:
     found = [one for name in SETS for one in pointings(name)]
-    beside = [one.slip.text for one in found if not one.any]
+    beside = [one.mutation.text for one in found if not one.any]
     assert len(beside) <= 0.05 * len(found), beside
     assert sum(one.first for one in found) >= 0.95 * len(found)
 
@@ -58,7 +58,7 @@ HEAD = "<t> ::= <a> <b>\n<a> ::= touching(x, y)\n<b> ::= coupled(x, y)\n"
     ],
 )  # fmt: skip
 def test_hints_restore_the_intended_text(written: str, meant: str) -> None:
-    told = of_tasks(written)
+    told = task_messages(written)
     assert told
     assert next(fixes(written, told)).applied(written).split() == meant.split()
 
@@ -69,7 +69,7 @@ def test_a_stage_defined_twice_and_used_twice_becomes_two_stages() -> None:
         "<grasp> ::= coupled(x, y)\n<move> ::= diverging(x, z)\n<drop> ::= decoupled(x, y)\n"
     )
     text = written
-    while told := of_tasks(text):
+    while told := task_messages(text):
         text = next(fixes(text, told)).applied(text)
     assert text.replace("_2", "") == written
     assert text.count("<move_2>") == 2

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.tasks.checks.test_mistakes_counted import fixes, of_tasks
+from tests.tasks.checks.test_mistakes_counted import fixes, task_messages
 from visup.tasks.checks.load import parse_task
 from visup.tasks.checks.usual_meanings import recoveries
 
@@ -25,7 +25,7 @@ RECOVERIES = [
 @pytest.mark.parametrize("line", RECOVERIES)
 def test_applying_the_hint_gives_a_recovery(line: str) -> None:
     text = TASK + line + "\n"
-    fix = next(fixes(text, of_tasks(text)))
+    fix = next(fixes(text, task_messages(text)))
     task = parse_task(fix.applied(text))
     assert len(task.recovered) == 1
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.tasks.scripted import Script, Spell, play
+from tests.tasks.scripted import RelationSpan, Script, play
 from visup.agent import Mind, Outcome, Verdict
 from visup.tasks.analysis.judging import judged
 from visup.tasks.checks.load import parse_task
@@ -22,13 +22,13 @@ NEARS, MEETS = ("converging", PAIR), ("touching", PAIR)
 
 def run_with_approach(name: str, trend: str = "", *, meets: bool = True) -> RunTrace:
     """A block, then a cap is put on a base; in some views the block does not seem to come nearer."""
-    spells = [Spell(trend, 2.0, 6.2, (BLOCK, BASE))] if trend else []
-    spells += [Spell("touching", 6.0, 1e9, (BLOCK, BASE))] if meets else []
-    spells += [
-        Spell("converging", 8.0, 10.2, (CAP, BASE)),
-        Spell("touching", 10.0, 1e9, (CAP, BASE)),
+    spans = [RelationSpan(trend, 2.0, 6.2, (BLOCK, BASE))] if trend else []
+    spans += [RelationSpan("touching", 6.0, 1e9, (BLOCK, BASE))] if meets else []
+    spans += [
+        RelationSpan("converging", 8.0, 10.2, (CAP, BASE)),
+        RelationSpan("touching", 10.0, 1e9, (CAP, BASE)),
     ]
-    script = Script(tuple(spells), objects=dict.fromkeys(NAMES, (0.0, 1e9)), identities=NAMES)
+    script = Script(tuple(spans), objects=dict.fromkeys(NAMES, (0.0, 1e9)), identities=NAMES)
     minds: list[Mind] = []
 
     def keep(mind: Mind, observation: object) -> Outcome:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from random import Random
 
 from tests.tasks.learning.test_learning import ARM, CRATE, PART, TRAY, run_of
-from tests.tasks.scripted import Spell
+from tests.tasks.scripted import RelationSpan
 from visup.agent import Verdict
 from visup.tasks import parse_task
 from visup.tasks.analysis.judging import judged
@@ -70,17 +70,17 @@ def test_an_incidental_contact_before_the_two_parts_meet_is_dropped() -> None:
 
 def assembly_run(name: str, seed: int, order: Sequence[int] = (PART, CRATE)) -> RunTrace:
     """Part and crate are put onto the tray, one after the other."""
-    rng, at, spells = Random(seed), 1.0, list[Spell]()
+    rng, at, spans = Random(seed), 1.0, list[RelationSpan]()
     for thing in order:
         arrives = at + rng.uniform(3.0, 5.0)
-        spells += [
-            Spell("converging", at, arrives, (thing, TRAY)),
-            Spell("touching", arrives, 1e9, (thing, TRAY)),
+        spans += [
+            RelationSpan("converging", at, arrives, (thing, TRAY)),
+            RelationSpan("touching", arrives, 1e9, (thing, TRAY)),
         ]
         at = arrives + rng.uniform(3.0, 4.0)
-    spells.append(Spell("touching", at - 3.0, 1e9, (PART, CRATE)))
-    spells.append(Spell("converging", 0.4, 2.0, (ARM, PART)))
-    return replace(run_of(name, spells), moved_s={"crate": 3.0, "part": 3.0, "tray": 0.0})
+    spans.append(RelationSpan("touching", at - 3.0, 1e9, (PART, CRATE)))
+    spans.append(RelationSpan("converging", 0.4, 2.0, (ARM, PART)))
+    return replace(run_of(name, spans), moved_s={"crate": 3.0, "part": 3.0, "tray": 0.0})
 
 
 def test_the_order_of_assembly_is_learned() -> None:

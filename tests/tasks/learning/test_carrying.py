@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.tasks.scripted import Script, Spell, play
+from tests.tasks.scripted import RelationSpan, Script, play
 from visup.agent import Mind, Outcome, Region, Verdict
 from visup.tasks.analysis.judging import judged
 from visup.tasks.checks.load import parse_task
@@ -119,16 +119,16 @@ def placed_run(name: str, share: float, down: int = 0, bobs: float = 0.0) -> Run
 
     `down` is how far below the fixture's upper edge its own one is, pixels, and `bobs` by how much the share
     changes, up and down."""
-    spells = [
-        Spell("converging", 2.0, 6.2, (PART, FIXTURE)),
-        Spell("touching", 6.0, 1e9, (PART, FIXTURE)),
+    spans = [
+        RelationSpan("converging", 2.0, 6.2, (PART, FIXTURE)),
+        RelationSpan("touching", 6.0, 1e9, (PART, FIXTURE)),
     ]
     share_at = lambda t: share + bobs * np.sin(2 * np.pi * t / 2.4)  # noqa: E731
-    return played_run(name, spells, share_at, down)
+    return played_run(name, spans, share_at, down)
 
 
 def played_run(
-    name: str, spells: Sequence[Spell], share: Callable[[float], float], down: int = 0
+    name: str, spans: Sequence[RelationSpan], share: Callable[[float], float], down: int = 0
 ) -> RunTrace:
     """A run of 12 s in which a part lies over a fixture with a share of its width."""
 
@@ -144,8 +144,8 @@ def played_run(
             for n, (x, y, w, h) in boxes.items()
         }
 
-    there = {n for s in spells for n in s.objects}
-    script = Script(tuple(spells), objects=dict.fromkeys(there, (0.0, 1e9)), identities=NAMES)
+    there = {n for s in spans for n in s.objects}
+    script = Script(tuple(spans), objects=dict.fromkeys(there, (0.0, 1e9)), identities=NAMES)
     minds: list[Mind] = []
 
     def keep(mind: Mind, observation: object) -> Outcome:
@@ -168,17 +168,17 @@ def release_run(
     apart: float = 9.2,
 ) -> RunTrace:
     """A gripper takes a part, puts it on the fixture and lets it go, which is told at `free`."""
-    spells = [
-        Spell("converging", 0.5, 2.8, (GRIPPER, PART)),
-        Spell("touching", 2.6, apart, (GRIPPER, PART)),
-        Spell("coupled", 3.0, free, (GRIPPER, PART)),
-        Spell("moving_together", 3.2, 6.2, (GRIPPER, PART)),
-        Spell("converging", 4.0, 6.2, (PART, FIXTURE)),
-        Spell("touching", 6.0, 1e9, (PART, FIXTURE)),
-        Spell("diverging", *leaves, (GRIPPER, PART)),
+    spans = [
+        RelationSpan("converging", 0.5, 2.8, (GRIPPER, PART)),
+        RelationSpan("touching", 2.6, apart, (GRIPPER, PART)),
+        RelationSpan("coupled", 3.0, free, (GRIPPER, PART)),
+        RelationSpan("moving_together", 3.2, 6.2, (GRIPPER, PART)),
+        RelationSpan("converging", 4.0, 6.2, (PART, FIXTURE)),
+        RelationSpan("touching", 6.0, 1e9, (PART, FIXTURE)),
+        RelationSpan("diverging", *leaves, (GRIPPER, PART)),
     ]
     carried = dict.fromkeys(HELD, ((3.2, 6.2),))
-    return replace(played_run(name, spells, lambda t: share), moves=carried)
+    return replace(played_run(name, spans, lambda t: share), moves=carried)
 
 
 def test_the_retreat_after_a_release_is_optional_if_the_part_is_in_place() -> None:

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.tasks.scripted import Script, Spell, play
+from tests.tasks.scripted import RelationSpan, Script, play
 from visup.agent import Mind, Outcome, Verdict
 from visup.agent.model.errors import TaskError
 from visup.tasks import parse_task
@@ -39,8 +39,8 @@ NAMES = {
 }
 
 
-def run_of(name: str, spells: Sequence[Spell], until: float = 40.0) -> RunTrace:
-    script = Script(tuple(spells), objects=dict.fromkeys(NAMES, (0.0, 1e9)), identities=NAMES)
+def run_of(name: str, spans: Sequence[RelationSpan], until: float = 40.0) -> RunTrace:
+    script = Script(tuple(spans), objects=dict.fromkeys(NAMES, (0.0, 1e9)), identities=NAMES)
     minds: list[Mind] = []
 
     def keep(mind: Mind, observation: object) -> Outcome:
@@ -55,25 +55,25 @@ def pick_run(name: str, seed: int, spoilt: str = "") -> RunTrace:
     """The arm comes to the part, couples, brings it to the tray, lets go."""
     rng = Random(seed)
     t1, t2, t3, t4 = (sum(rng.uniform(2.5, 5.0) for _ in range(k)) for k in (1, 2, 3, 4))
-    spells = [
-        Spell("converging", 0.6, t1 + 0.4, (ARM, PART)),
-        Spell("touching", t1, t4, (ARM, PART)),
-        Spell("coupled", t1 + 0.8, t4, (ARM, PART)),
-        Spell("converging", t2, t3, (PART, TRAY)),
-        Spell("touching", t3, 1e9, (PART, TRAY)),
-        Spell("diverging", t4, t4 + 6.0, (ARM, PART)),
+    spans = [
+        RelationSpan("converging", 0.6, t1 + 0.4, (ARM, PART)),
+        RelationSpan("touching", t1, t4, (ARM, PART)),
+        RelationSpan("coupled", t1 + 0.8, t4, (ARM, PART)),
+        RelationSpan("converging", t2, t3, (PART, TRAY)),
+        RelationSpan("touching", t3, 1e9, (PART, TRAY)),
+        RelationSpan("diverging", t4, t4 + 6.0, (ARM, PART)),
     ]
     if rng.random() < 0.5:  # something that some runs have, by the way
-        spells.append(Spell("converging", 1.0, 3.0, (CRATE, TRAY)))
+        spans.append(RelationSpan("converging", 1.0, 3.0, (CRATE, TRAY)))
     if spoilt == "never":
-        spells = spells[:1]
+        spans = spans[:1]
     elif spoilt == "drop":
-        spells[2] = Spell("coupled", t1 + 0.8, t2, (ARM, PART))
-        spells[1] = Spell("touching", t1, t2, (ARM, PART))
-        spells[3:] = [Spell("diverging", t2, t2 + 8.0, (ARM, PART))]
+        spans[2] = RelationSpan("coupled", t1 + 0.8, t2, (ARM, PART))
+        spans[1] = RelationSpan("touching", t1, t2, (ARM, PART))
+        spans[3:] = [RelationSpan("diverging", t2, t2 + 8.0, (ARM, PART))]
     elif spoilt == "bump":
-        spells.append(Spell("touching", t2, t2 + 2.0, (ARM, CRATE)))
-    return run_of(name, spells, t4 + 14.0)
+        spans.append(RelationSpan("touching", t2, t2 + 2.0, (ARM, CRATE)))
+    return run_of(name, spans, t4 + 14.0)
 
 
 @cache
@@ -117,12 +117,12 @@ def test_a_learned_task_resembles_a_handwritten_one() -> None:
 
 def wiping_run(name: str, times: int, every_s: float = 3.0, seed: int = 0) -> RunTrace:
     """The arm touches the tray again and again, then holds the part."""
-    rng, at, spells = Random(seed + times), 2.0, []
+    rng, at, spans = Random(seed + times), 2.0, []
     for _ in range(times):
-        spells.append(Spell("touching", at, at + 1.0, (ARM, TRAY)))
+        spans.append(RelationSpan("touching", at, at + 1.0, (ARM, TRAY)))
         at += every_s * rng.uniform(0.9, 1.2)
-    spells += [Spell(n, at, 1e9, (ARM, PART)) for n in ("touching", "coupled")]
-    return run_of(name, spells, at + 8.0)
+    spans += [RelationSpan(n, at, 1e9, (ARM, PART)) for n in ("touching", "coupled")]
+    return run_of(name, spans, at + 8.0)
 
 
 def test_a_regular_repetition_is_learned_as_a_period() -> None:
@@ -300,8 +300,8 @@ PAUSE = "pauses when touching(part, tray)"
 def test_pauses_count_towards_a_duration_only_inside_its_clause(course: str, seconds: str) -> None:
     task = parse_task(f"<hold> ::= {course}")
     hold, pause = (
-        Spell("touching", 1.0, 30.0, (ARM, PART)),
-        Spell("touching", 2.0, 12.0, (PART, TRAY)),
+        RelationSpan("touching", 1.0, 30.0, (ARM, PART)),
+        RelationSpan("touching", 2.0, 12.0, (PART, TRAY)),
     )
     run = judged(task, run_of("paused", [hold, pause], 20.0).minds)
     assert run.verdict is Verdict.SUCCEEDED

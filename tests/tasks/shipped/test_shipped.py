@@ -7,7 +7,7 @@ from math import sin
 
 import pytest
 
-from tests.tasks.scripted import Script, Spell, play
+from tests.tasks.scripted import RelationSpan, Script, play
 from visup.agent import Verdict
 from visup.tasks import load_task, shipped_tasks
 from visup.tasks.grammar.structure import task_actors
@@ -89,10 +89,10 @@ def lived(name: str, days: Days, gaps: Gaps) -> Verdict:
     if name == "handover":
         numbers = {"giver": 1, "payload": 2, "receiver": 3}
     identities = {i: {task.models(a)[0]: 0.9} for a, i in numbers.items()}
-    spells = tuple(Spell(n, a, b, pair) for n, a, b, pair in days[name])
+    spans = tuple(RelationSpan(n, a, b, pair) for n, a, b, pair in days[name])
     objects = dict.fromkeys(numbers.values(), (0.0, 1e9))
-    until = max(s.to_s for s in spells)
-    script = Script(spells, objects, identities=identities, gaps=gaps.get(name))
+    until = max(s.to_s for s in spans)
+    script = Script(spans, objects, identities=identities, gaps=gaps.get(name))
     return finish(play(task_reasoner([task]), script, until, fps=5.0).last.tasks[0])
 
 

@@ -9,7 +9,16 @@ from types import MappingProxyType
 import numpy as np
 import pytest
 
-from tests.tasks.scripted import ARM, INTRUDER, REGION, SATELLITE, Played, Script, Spell, play
+from tests.tasks.scripted import (
+    ARM,
+    INTRUDER,
+    REGION,
+    SATELLITE,
+    RelationSpan,
+    Script,
+    ScriptedRun,
+    play,
+)
 from visup.agent import Mind, Observation, Outcome, Status, TaskBelief, Verdict, Zone
 from visup.agent.model.errors import TaskError
 from visup.rules.relations.zones import ZoneReasoner
@@ -17,26 +26,26 @@ from visup.tasks import load_task, load_tasks, parse_task
 from visup.tasks.actions.actions import ActionDefinition, known_actions, with_actions
 from visup.tasks.supervision.supervise import finish, task_reasoner
 
-NEARS = Spell("converging", 0.5, 6.0)
-MEETS = Spell("touching", 5.8, 30.0)
-HOLDS = Spell("coupled", 8.0, 30.0)
+NEARS = RelationSpan("converging", 0.5, 6.0)
+MEETS = RelationSpan("touching", 5.8, 30.0)
+HOLDS = RelationSpan("coupled", 8.0, 30.0)
 BOOM = {ARM: (0.0, 1e9), SATELLITE: (0.0, 1e9), INTRUDER: (0.0, 1e9)}
 ACTORS = "actor boom is dish\n"
 
 
-def watch(text: str, script: Script, until: float = 20.0) -> Played:
+def watch(text: str, script: Script, until: float = 20.0) -> ScriptedRun:
     return play(task_reasoner([parse_task(text)]), script, until)
 
 
-def belief(played: Played, time: float | None = None) -> TaskBelief:
+def belief(played: ScriptedRun, time: float | None = None) -> TaskBelief:
     return (played.last if time is None else played.at(time)).tasks[0]
 
 
-def status(played: Played, stage: str, time: float | None = None) -> Status:
+def status(played: ScriptedRun, stage: str, time: float | None = None) -> Status:
     return next(s.status for s in belief(played, time).stages if s.stage == stage)
 
 
-def first(played: Played, kind: str, stage: str) -> float:
+def first(played: ScriptedRun, kind: str, stage: str) -> float:
     return next(e.time for e in played.events if e.kind == kind and e.data.get("stage") == stage)
 
 
@@ -46,7 +55,7 @@ def test_a_stage_ends_when_its_file_says_so() -> None:
         "<near> ::= converging(arm, satellite){}\n"
         "<far> ::= diverging(arm, satellite)"
     )
-    script = Script((Spell("converging", 0.5, 9.0), Spell("touching", 4.0, 9.0)))
+    script = Script((RelationSpan("converging", 0.5, 9.0), RelationSpan("touching", 4.0, 9.0)))
     assert status(watch(text.format(""), script, 8.0), "near") is Status.PROGRESSING
     ended = watch(text.format(" ends when touching(arm, satellite) for 1 s"), script, 8.0)
     assert status(ended, "near") is Status.DONE
@@ -80,7 +89,7 @@ def test_a_stage_begins_when_its_file_says_so_and_not_before() -> None:
 
 def test_nothing_counts_for_or_against_a_first_stage_before_it_begins() -> None:
     text = "<t> ::= converging(arm, satellite) begins when touching(arm, satellite)"
-    script = Script((Spell("diverging", 0.0, 9.0), Spell("touching", 12.0, 30.0)))
+    script = Script((RelationSpan("diverging", 0.0, 9.0), RelationSpan("touching", 12.0, 30.0)))
     assert status(watch(text, script, 11.0), "t") is Status.ACTIVE
     assert (
         status(watch("<t> ::= converging(arm, satellite)", script, 11.0), "t") is not Status.ACTIVE
@@ -89,10 +98,10 @@ def test_nothing_counts_for_or_against_a_first_stage_before_it_begins() -> None:
 
 def test_what_counts_as_failure_stands_in_place_of_the_contrary() -> None:
     text = "<t> ::= converging(arm, satellite) fails when touching(arm, satellite) for 1 s"
-    parting = Script((Spell("diverging", 1.0, 30.0),))
+    parting = Script((RelationSpan("diverging", 1.0, 30.0),))
     assert status(watch(text, parting, 10.0), "t") not in (Status.FAILING, Status.FAILED)
     # It counts although the action holds.
-    script = Script((Spell("converging", 0.5, 30.0), Spell("touching", 5.0, 30.0)))
+    script = Script((RelationSpan("converging", 0.5, 30.0), RelationSpan("touching", 5.0, 30.0)))
     played = watch(text, script, 8.0)
     assert status(played, "t") is Status.FAILING
     assert 5.9 <= first(played, "stage_failing", "t") <= 6.8
@@ -100,7 +109,7 @@ def test_what_counts_as_failure_stands_in_place_of_the_contrary() -> None:
 
 def test_what_counts_as_progress_stands_in_place_of_the_usual() -> None:
     text = "<t> ::= coupled(arm, satellite){}"
-    script = Script((Spell("converging", 0.5, 30.0),))
+    script = Script((RelationSpan("converging", 0.5, 30.0),))
     assert status(watch(text.format(""), script, 10.0), "t") is Status.PROGRESSING
     strict = watch(text.format(" progresses when touching(arm, satellite)"), script, 10.0)
     assert status(strict, "t") is Status.ACTIVE
@@ -118,14 +127,16 @@ def test_what_counts_as_progress_stands_in_place_of_the_usual() -> None:
 )
 def test_conditions_are_read_as_they_are_written(condition: str, true: bool) -> None:
     text = f"<t> ::= keeping_distance(arm, satellite)\nnever {condition}"
-    script = Script((Spell("keeping_distance", 0.0, 30.0), Spell("touching", 0.0, 30.0)))
+    script = Script(
+        (RelationSpan("keeping_distance", 0.0, 30.0), RelationSpan("touching", 0.0, 30.0))
+    )
     broken = belief(watch(text, script, 5.0)).verdict is Verdict.INTERRUPTED
     assert broken is true
 
 
 def test_what_must_never_be_of_one_body_fails_the_task_and_is_not_unsafe() -> None:
     text = "<t> ::= <near>\n<near> ::= keeping_distance(arm, satellite) for 9 s\nnever present(satellite)"
-    script = Script((Spell("keeping_distance", 0.0, 30.0),))
+    script = Script((RelationSpan("keeping_distance", 0.0, 30.0),))
     found = watch(text, script, 5.0)
     assert belief(found).verdict is Verdict.FAILED
     assert status(found, "near") is Status.FAILED
@@ -133,7 +144,7 @@ def test_what_must_never_be_of_one_body_fails_the_task_and_is_not_unsafe() -> No
 
 def test_a_condition_that_cannot_be_observed_breaks_nothing() -> None:
     text = "<t> ::= keeping_distance(arm, satellite)\nnever not moving(boom)"
-    script = Script((Spell("keeping_distance", 0.0, 30.0),))
+    script = Script((RelationSpan("keeping_distance", 0.0, 30.0),))
     assert belief(watch(ACTORS + text, script, 5.0)).verdict is Verdict.SUCCEEDED
 
 
@@ -152,7 +163,7 @@ def test_an_invariant_waits_as_long_as_it_says_and_counts_in_its_stages_only() -
     assert next(e.time for e in soon.events if e.kind == kind) == pytest.approx(6.3, abs=0.2)
     assert next(e.time for e in late.events if e.kind == kind) == pytest.approx(10.8, abs=0.2)
     # The stage that groups counts for those inside it.
-    early = Script((Spell("converging", 0.5, 9.0), Spell("touching", 3.0, 4.5)))
+    early = Script((RelationSpan("converging", 0.5, 9.0), RelationSpan("touching", 3.0, 4.5)))
     text = text.replace("coupled", "diverging")
     during = watch(text.format(" during <first>"), early, 8.0)
     assert kind in [e.kind for e in during.events]
@@ -162,8 +173,8 @@ def test_an_invariant_waits_as_long_as_it_says_and_counts_in_its_stages_only() -
 def test_repetitions_are_counted() -> None:
     text = "<t> ::= <go> {}\n<go> ::= converging(arm, satellite) for 1 s diverging(arm, satellite) for 1 s"
     twice = Script(
-        tuple(Spell("converging", t, t + 2.0) for t in (0.5, 4.5))
-        + tuple(Spell("diverging", t, t + 2.0) for t in (2.5, 6.5))
+        tuple(RelationSpan("converging", t, t + 2.0) for t in (0.5, 4.5))
+        + tuple(RelationSpan("diverging", t, t + 2.0) for t in (2.5, 6.5))
     )
     assert belief(watch(text.format("at least 2 times at most 2 times"), twice, 9.0)).verdict is (
         Verdict.SUCCEEDED
@@ -177,11 +188,17 @@ def test_any_order_is_any_order_and_each_is_asked_for(order: tuple[str, str]) ->
         "<t> ::= any order (<touch>, <near>) <caught>\n<touch> ::= touching(arm, satellite) for 1 s\n"
         "<near> ::= converging(arm, satellite) for 1 s\n<caught> ::= coupled(arm, satellite)"
     )
-    script = Script((Spell(order[0], 1.0, 4.0), Spell(order[1], 4.0, 7.0), Spell("coupled", 7, 30)))
+    script = Script(
+        (
+            RelationSpan(order[0], 1.0, 4.0),
+            RelationSpan(order[1], 4.0, 7.0),
+            RelationSpan("coupled", 7, 30),
+        )
+    )
     played = watch(text, script, 15.0)
     assert belief(played).verdict is Verdict.SUCCEEDED
     assert {status(played, s) for s in ("touch", "near")} == {Status.DONE}
-    only = Script((Spell("touching", 1.0, 7.0), Spell("coupled", 7.0, 30.0)))
+    only = Script((RelationSpan("touching", 1.0, 7.0), RelationSpan("coupled", 7.0, 30.0)))
     assert belief(watch(text, only, 15.0)).verdict is not Verdict.SUCCEEDED
 
 
@@ -267,11 +284,12 @@ def test_words_and_quantities_of_rules_are_actions() -> None:
 def test_a_parameter_stands_for_its_amount() -> None:
     text = "parameter patience is 4 s\n<t> ::= converging(arm, satellite) for patience"
     assert (
-        belief(watch(text, Script((Spell("converging", 0, 30),)), 3.5)).verdict
+        belief(watch(text, Script((RelationSpan("converging", 0, 30),)), 3.5)).verdict
         is Verdict.IN_PROGRESS
     )
     assert (
-        belief(watch(text, Script((Spell("converging", 0, 30),)), 4.6)).verdict is Verdict.SUCCEEDED
+        belief(watch(text, Script((RelationSpan("converging", 0, 30),)), 4.6)).verdict
+        is Verdict.SUCCEEDED
     )
 
 
@@ -279,7 +297,7 @@ def test_plug_ins_add_actions() -> None:
     gripped = ActionDefinition("gripped", holds=("gripped",), arity=2, hold_s=0.5, text="gripped")
     actions = with_actions(known_actions(), [gripped])
     task = parse_task("<t> ::= gripped(arm, satellite)", actions=actions)
-    script = Script((Spell("gripped", 2.0, 30.0),), known=["gripped"])
+    script = Script((RelationSpan("gripped", 2.0, 30.0),), known=["gripped"])
     assert play(task_reasoner([task], actions=actions), script, 4.0).last.tasks[0].verdict is (
         Verdict.SUCCEEDED
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.tasks.scripted import Played, Script, Spell, play, task_of
+from tests.tasks.scripted import RelationSpan, Script, ScriptedRun, play, task_of
 from visup.agent import Verdict
 from visup.tasks import parse_task
 from visup.tasks.supervision.supervise import finish, task_reasoner
@@ -19,13 +19,13 @@ OVER_S = 3.0
 """When `<soap>` is over: the hose touches the car from 1 s on."""
 
 
-def washed(clause: str, begins: float, text: str = WASH) -> Played:
+def washed(clause: str, begins: float, text: str = WASH) -> ScriptedRun:
     """The sponge is on the car for 4 s."""
-    spells = (
-        Spell("touching", 1.0, OVER_S, (CAR, HOSE)),
-        Spell("touching", begins, begins + 4.0, (CAR, SPONGE)),
+    spans = (
+        RelationSpan("touching", 1.0, OVER_S, (CAR, HOSE)),
+        RelationSpan("touching", begins, begins + 4.0, (CAR, SPONGE)),
     )
-    script = Script(spells, objects=dict.fromkeys(NAMES, (0.0, 1e9)), identities=NAMES)
+    script = Script(spans, objects=dict.fromkeys(NAMES, (0.0, 1e9)), identities=NAMES)
     reasoner = task_reasoner([parse_task(text.format(clause))])
     return play(reasoner, script, max(20.0, begins + 6.0), fps=5.0)
 
@@ -51,7 +51,7 @@ def test_a_stage_begins_neither_sooner_nor_later_than_its_delay(
 def test_a_delay_of_the_first_stage_counts_from_the_beginning(begins: float, good: bool) -> None:
     text = "<wash> ::= touching(hose, car) for 2 s {}"
     script = Script(
-        (Spell("touching", begins, 1e9, (CAR, HOSE)),),
+        (RelationSpan("touching", begins, 1e9, (CAR, HOSE)),),
         objects=dict.fromkeys(NAMES, (0.0, 1e9)),
         identities=NAMES,
     )
@@ -77,10 +77,10 @@ def test_why_it_fails_is_told(begins: float, why: str) -> None:
 def test_what_goes_on_until_the_next_thing_is_over_when_it_was_last_seen() -> None:
     text = WASH.replace("touching(hose, car) for 2 s", "converging(hose, car)")
     for begins, good in ((6.0, False), (10.0, True)):
-        spells = (
-            Spell("converging", 1.0, OVER_S, (CAR, HOSE)),
-            Spell("touching", begins, begins + 4.0, (CAR, SPONGE)),
+        spans = (
+            RelationSpan("converging", 1.0, OVER_S, (CAR, HOSE)),
+            RelationSpan("touching", begins, begins + 4.0, (CAR, SPONGE)),
         )
-        script = Script(spells, objects=dict.fromkeys(NAMES, (0.0, 1e9)), identities=NAMES)
+        script = Script(spans, objects=dict.fromkeys(NAMES, (0.0, 1e9)), identities=NAMES)
         played = play(task_reasoner([parse_task(text.format("after 5 s"))]), script, 20.0, fps=5.0)
         assert (finish(task_of(played)) is Verdict.SUCCEEDED) == good

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.tasks.scripted import ARM, INTRUDER, SATELLITE, Script, Spell, play
+from tests.tasks.scripted import ARM, INTRUDER, SATELLITE, RelationSpan, Script, play
 from visup.agent import Relation, Status, Truth
 from visup.tasks import parse_task
 from visup.tasks.automaton.entries import (
@@ -66,9 +66,9 @@ def test_nothing_coincides_with_nothing() -> None:
     assert coincidence([]) is None
 
 
-def stages(text: str, spells: tuple[Spell, ...], seconds: float) -> dict[str, set[Status]]:
+def stages(text: str, spans: tuple[RelationSpan, ...], seconds: float) -> dict[str, set[Status]]:
     """All statuses that each stage was believed to have."""
-    played = play(task_reasoner([parse_task(text)]), Script(spells), seconds)
+    played = play(task_reasoner([parse_task(text)]), Script(spans), seconds)
     found: dict[str, set[Status]] = {}
     for mind in played.minds:
         for stage in mind.tasks[0].stages:
@@ -78,7 +78,7 @@ def stages(text: str, spells: tuple[Spell, ...], seconds: float) -> dict[str, se
 
 @pytest.mark.parametrize("text", [CARRY, APPROACHED])
 def test_what_turns_back_before_the_next_stage_fails_in_the_stage_that_lasts(text: str) -> None:
-    turns = (Spell("converging", 0.5, 5.0), Spell("diverging", 5.5, 12.0))
+    turns = (RelationSpan("converging", 0.5, 5.0), RelationSpan("diverging", 5.5, 12.0))
     found = stages(text, turns, 10.0)
     lasting = "carry" if "carry" in found else "near"
     assert Status.FAILING in found[lasting]
@@ -90,9 +90,9 @@ def test_one_entry_may_be_doubted_when_another_is_confirmed(
     coupled_until: float, done: bool
 ) -> None:
     told = (
-        Spell("converging", 0.5, 5.0),
-        Spell("coupled", 1.0, coupled_until),
-        Spell("touching", 4.9, 9.0),
+        RelationSpan("converging", 0.5, 5.0),
+        RelationSpan("coupled", 1.0, coupled_until),
+        RelationSpan("touching", 4.9, 9.0),
     )
     found = stages(CARRY, told, 8.0)
     assert (Status.DONE in found["place"]) is done
@@ -116,13 +116,13 @@ def test_what_held_until_the_other_was_confirmed_has_held_with_it(
     """A gripper opens as it sets a part down: its hold is in doubt before the contact is confirmed."""
     hold, meeting = (ARM, SATELLITE), (SATELLITE, INTRUDER)
     told = (
-        Spell("moving_together", 1.0, 4.95, hold),
-        Spell("converging", 2.5, 4.7, meeting),
-        Spell("touching", 4.9, 12.0, meeting),
-        Spell("touching", 0.5, 5.5, hold),
-        Spell("coupled", 1.0, coupled_until, hold),
-        Spell("coupled", coupled_until, 5.1, hold, truth=Truth.UNKNOWN),
-        Spell("diverging", 5.3, 12.0, hold),
+        RelationSpan("moving_together", 1.0, 4.95, hold),
+        RelationSpan("converging", 2.5, 4.7, meeting),
+        RelationSpan("touching", 4.9, 12.0, meeting),
+        RelationSpan("touching", 0.5, 5.5, hold),
+        RelationSpan("coupled", 1.0, coupled_until, hold),
+        RelationSpan("coupled", coupled_until, 5.1, hold, truth=Truth.UNKNOWN),
+        RelationSpan("diverging", 5.3, 12.0, hold),
     )
     script = Script(told, dict.fromkeys((ARM, SATELLITE, INTRUDER), (0.0, 1000000000.0)))
     played = play(task_reasoner([parse_task(PUT)]), script, 10.0, fps=10.0)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import pytest
 
 from tests.rules.percepts_from_truth import MISSIONS
-from tests.tasks.scripted import Script, Spell, play
+from tests.tasks.scripted import RelationSpan, Script, play
 from tests.tasks.supervision.test_missions import NAMES, run
 from visup.agent import Mind
 from visup.evaluation.reasoning.filter_laws import (
@@ -26,23 +26,23 @@ from visup.tasks.supervision.supervise import task_reasoner
 from visup.tasks.verification.settings import DEFAULT_SETTINGS
 
 DOCKS = (
-    Spell("converging", 0.5, 12.3),
-    Spell("touching", 12.0, 30),
-    Spell("coupled", 13.0, 30),
+    RelationSpan("converging", 0.5, 12.3),
+    RelationSpan("touching", 12.0, 30),
+    RelationSpan("coupled", 13.0, 30),
 )
 FAILS = (
-    Spell("converging", 0.5, 12.3),
-    Spell("touching", 12.0, 12.8),
-    Spell("diverging", 12.8, 30),
+    RelationSpan("converging", 0.5, 12.3),
+    RelationSpan("touching", 12.0, 12.8),
+    RelationSpan("diverging", 12.8, 30),
 )
 RETRIES = (
-    Spell("converging", 0, 5),
-    Spell("diverging", 6, 10),
-    Spell("converging", 11, 15),
-    Spell("diverging", 16, 18),
-    Spell("converging", 19, 25),
-    Spell("touching", 25, 40),
-    Spell("coupled", 26, 40),
+    RelationSpan("converging", 0, 5),
+    RelationSpan("diverging", 6, 10),
+    RelationSpan("converging", 11, 15),
+    RelationSpan("diverging", 16, 18),
+    RelationSpan("converging", 19, 25),
+    RelationSpan("touching", 25, 40),
+    RelationSpan("coupled", 26, 40),
 )
 ORDERS = """<t> ::= any order (<s0>, <s1>, <s2>)
 <s0> ::= touching(arm, satellite)
@@ -50,10 +50,10 @@ ORDERS = """<t> ::= any order (<s0>, <s1>, <s2>)
 <s2> ::= converging(arm, satellite)
 """
 MIXED = (
-    Spell("keeping_distance", 1.0, 3.5),
-    Spell("converging", 4.0, 8.0),
-    Spell("touching", 8.0, 10.0),
-    Spell("diverging", 12.0, 14.0),
+    RelationSpan("keeping_distance", 1.0, 3.5),
+    RelationSpan("converging", 4.0, 8.0),
+    RelationSpan("touching", 8.0, 10.0),
+    RelationSpan("diverging", 12.0, 14.0),
 )
 
 
@@ -74,7 +74,7 @@ def recorded(model: MonitoredPhases, minds: Sequence[Mind]) -> Recorded:
 
 
 @pytest.mark.parametrize(
-    ("task", "spells"),
+    ("task", "spans"),
     [
         (load_task("dock"), DOCKS),
         (load_task("dock"), FAILS),
@@ -83,9 +83,9 @@ def recorded(model: MonitoredPhases, minds: Sequence[Mind]) -> Recorded:
     ],
 )
 def test_on_scripted_scenes_supervision_is_within_its_bound(
-    task: Task, spells: tuple[Spell, ...]
+    task: Task, spans: tuple[RelationSpan, ...]
 ) -> None:
-    played = play(task_reasoner([task]), Script(spells), 28.0)
+    played = play(task_reasoner([task]), Script(spans), 28.0)
     model = model_of(task)
     found = distance_to_certified(model, recorded(model, played.minds))
     assert found.lost < 1e-6

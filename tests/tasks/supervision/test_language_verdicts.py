@@ -6,54 +6,54 @@ from dataclasses import replace
 
 import pytest
 
-from tests.tasks.scripted import ARM, SATELLITE, Script, Spell, task_of, watch
+from tests.tasks.scripted import ARM, SATELLITE, RelationSpan, Script, task_of, watch
 from visup.agent import Severity, Verdict
 from visup.tasks.supervision.supervise import finish
 from visup.wording import worded_once
 
 
-def spells(*named: tuple[str, float, float]) -> Script:
-    return Script(tuple(Spell(*n) for n in named))
+def spans(*named: tuple[str, float, float]) -> Script:
+    return Script(tuple(RelationSpan(*n) for n in named))
 
 
 HOLD = ("keeping_distance", 5, 12)
 CASES = {
     "an alternative, the first": (
         "<t> ::= converging(arm, satellite) (touching(arm, satellite) | diverging(arm, satellite))",
-        spells(("converging", 0, 5), ("touching", 5, 9)),
+        spans(("converging", 0, 5), ("touching", 5, 9)),
         Verdict.SUCCEEDED,
     ),
     "an alternative, the second": (
         "<t> ::= converging(arm, satellite) (touching(arm, satellite) | diverging(arm, satellite))",
-        spells(("converging", 0, 5), ("diverging", 5.5, 9)),
+        spans(("converging", 0, 5), ("diverging", 5.5, 9)),
         Verdict.SUCCEEDED,
     ),
     "what may be left out, left out": (
         "<t> ::= converging(arm, satellite) keeping_distance(arm, satellite)? "
         "touching(arm, satellite)",
-        spells(("converging", 0, 5), ("touching", 5, 9)),
+        spans(("converging", 0, 5), ("touching", 5, 9)),
         Verdict.SUCCEEDED,
     ),
     "what may be left out, there": (
         "<t> ::= converging(arm, satellite) keeping_distance(arm, satellite)? "
         "touching(arm, satellite)",
-        spells(("converging", 0, 5), HOLD, ("converging", 12, 13), ("touching", 13, 16)),
+        spans(("converging", 0, 5), HOLD, ("converging", 12, 13), ("touching", 13, 16)),
         Verdict.SUCCEEDED,
     ),
     "what must be there, left out": (
         "<t> ::= converging(arm, satellite) keeping_distance(arm, satellite) for 5 s "
         "touching(arm, satellite)",
-        spells(("converging", 0, 5), ("keeping_distance", 5, 7), ("diverging", 7, 15)),
+        spans(("converging", 0, 5), ("keeping_distance", 5, 7), ("diverging", 7, 15)),
         Verdict.FAILED,
     ),
     "a repetition, none": (
         "<t> ::= (converging(arm, satellite) diverging(arm, satellite))* touching(arm, satellite)",
-        spells(("touching", 3, 9)),
+        spans(("touching", 3, 9)),
         Verdict.SUCCEEDED,
     ),
     "a repetition, two": (
         "<t> ::= (converging(arm, satellite) diverging(arm, satellite))* touching(arm, satellite)",
-        spells(
+        spans(
             ("converging", 0, 4),
             ("diverging", 4, 8),
             ("converging", 8, 12),
@@ -64,7 +64,7 @@ CASES = {
     ),
     "a repetition, at least once": (
         "<t> ::= (converging(arm, satellite) diverging(arm, satellite))+ coupled(arm, satellite)",
-        spells(
+        spans(
             ("converging", 0, 4),
             ("diverging", 4, 8),
             ("converging", 8, 12),
@@ -75,49 +75,49 @@ CASES = {
     ),
     "at the same time": (
         "<t> ::= converging(arm, satellite) & present(arm) touching(arm, satellite)",
-        spells(("converging", 0, 5), ("touching", 5, 8)),
+        spans(("converging", 0, 5), ("touching", 5, 8)),
         Verdict.SUCCEEDED,
     ),
     "held for long enough": (
         "<t> ::= keeping_distance(arm, satellite) for 5 s",
-        spells(HOLD),
+        spans(HOLD),
         Verdict.SUCCEEDED,
     ),
     "not held for long enough": (
         "<t> ::= keeping_distance(arm, satellite) for 8 s",
-        spells(HOLD, ("diverging", 12, 20)),
+        spans(HOLD, ("diverging", 12, 20)),
         Verdict.FAILED,
     ),
     "in time": (
         "<t> ::= converging(arm, satellite) within 8 s touching(arm, satellite)",
-        spells(("converging", 0, 5), ("touching", 5, 8)),
+        spans(("converging", 0, 5), ("touching", 5, 8)),
         Verdict.SUCCEEDED,
     ),
     "too late": (
         "<t> ::= converging(arm, satellite) within 4 s touching(arm, satellite)",
-        spells(("converging", 0, 5), ("touching", 5, 8)),
+        spans(("converging", 0, 5), ("touching", 5, 8)),
         Verdict.FAILED,
     ),
     "too late in all": (
         "<t> ::= (converging(arm, satellite) coupled(arm, satellite)) within 10 s",
-        spells(("converging", 0, 8), ("touching", 8, 30), ("coupled", 12, 30)),
+        spans(("converging", 0, 8), ("touching", 8, 30), ("coupled", 12, 30)),
         Verdict.FAILED,
     ),
     "something that must never be": (
         "<t> ::= converging(arm, satellite) keeping_distance(arm, satellite)\n"
         "never touching(arm, satellite)",
-        spells(("converging", 0, 5), ("touching", 5, 7), ("keeping_distance", 7, 12)),
+        spans(("converging", 0, 5), ("touching", 5, 7), ("keeping_distance", 7, 12)),
         Verdict.INTERRUPTED,
     ),
     "something that must never be in another stage": (
         "<t> ::= <a> <b>\n<a> ::= converging(arm, satellite)\n<b> ::= touching(arm, satellite)\n"
         "never moving_together(arm, satellite) during <a>",
-        spells(("converging", 0, 5), ("touching", 5, 9), ("moving_together", 5.5, 9)),
+        spans(("converging", 0, 5), ("touching", 5, 9), ("moving_together", 5.5, 9)),
         Verdict.SUCCEEDED,
     ),
     "something that must always be": (
         "<t> ::= converging(arm, satellite) touching(arm, satellite)\nalways present(arm)",
-        spells(("converging", 0, 5), ("touching", 5, 9)),
+        spans(("converging", 0, 5), ("touching", 5, 9)),
         Verdict.SUCCEEDED,
     ),
 }
@@ -126,7 +126,7 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 def test_verdicts_of_the_language(name: str) -> None:
     text, script, verdict = CASES[name]
-    until = max(s.to_s for s in script.spells)
+    until = max(s.to_s for s in script.spans)
     assert finish(task_of(watch(script, until, text))) is verdict
 
 
@@ -147,7 +147,7 @@ LEAVES = {ARM: (0.0, 6.0), SATELLITE: (0.0, 1e9)}
 @pytest.mark.parametrize("must", ["never touching(arm, satellite)", "always present(arm)"])
 def test_a_broken_invariant_is_told_once_with_what_the_task_comes_to(must: str) -> None:
     text = f"<t> ::= converging(arm, satellite) keeping_distance(arm, satellite) for 3 s\n{must}"
-    script = spells(("converging", 0, 5), ("keeping_distance", 5, 12), ("touching", 6, 9))
+    script = spans(("converging", 0, 5), ("keeping_distance", 5, 12), ("touching", 6, 9))
     script = replace(script, objects=LEAVES) if "present" in must else script
     played = watch(script, 12.0, text)
     told = [e for step in played.outcomes for e in worded_once(step.events)]

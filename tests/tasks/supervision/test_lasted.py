@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.tasks.scripted import ARM, SATELLITE, Script, Spell, task_of, watch
+from tests.tasks.scripted import ARM, SATELLITE, RelationSpan, Script, task_of, watch
 from visup.agent import Truth, Verdict
 from visup.tasks.grammar.parser import read
 from visup.tasks.supervision.supervise import finish
@@ -22,8 +22,8 @@ tenths = st.integers(10, 90).map(lambda n: n / 10)
 
 @settings(max_examples=15)
 @given(st.lists(st.tuples(tenths, tenths), max_size=3))
-def test_alone_it_says_what_the_stage_condition_says(spells: list[tuple[float, float]]) -> None:
-    script = Script([Spell("touching", at, at + lasts) for at, lasts in spells])
+def test_alone_it_says_what_the_stage_condition_says(spans: list[tuple[float, float]]) -> None:
+    script = Script([RelationSpan("touching", at, at + lasts) for at, lasts in spans])
     texts = ("touching(arm, satellite) for 2 s", "(touching(arm, satellite) for 2 s)")
     one, other = (task_of(watch(script, 12.0, DOCK.format(t), fps=5.0)) for t in texts)
     assert (one.verdict, one.confidence) == (other.verdict, other.confidence)
@@ -41,9 +41,9 @@ def test_alone_it_says_what_the_stage_condition_says(spells: list[tuple[float, f
 def test_it_may_stand_among_others(condition: str, good: bool) -> None:
     script = Script(
         [
-            Spell("converging", 0.5, 3.0),
-            Spell("touching", 3.0, 6.0),
-            Spell("coupled", 6.5, 8.0),
+            RelationSpan("converging", 0.5, 3.0),
+            RelationSpan("touching", 3.0, 6.0),
+            RelationSpan("coupled", 6.5, 8.0),
         ]
     )
     played = watch(script, 10.0, DOCK.format(condition), fps=5.0)
@@ -63,10 +63,10 @@ def test_it_counts_from_when_it_began_to_hold_however_late_that_is_seen(
     until = 3.0 + lasts / 10
     script = Script(
         [
-            Spell("converging", 0.5, 2.9),
-            Spell("touching", 2.9, until),
-            Spell("coupled", 3.0, 3.0 + late / 10, truth=Truth.UNKNOWN),
-            Spell("coupled", 3.0, until),
+            RelationSpan("converging", 0.5, 2.9),
+            RelationSpan("touching", 2.9, until),
+            RelationSpan("coupled", 3.0, 3.0 + late / 10, truth=Truth.UNKNOWN),
+            RelationSpan("coupled", 3.0, until),
         ],
         objects={ARM: (0.0, until), SATELLITE: (0.0, 1e9)},
     )
@@ -78,7 +78,11 @@ def test_it_counts_from_when_it_began_to_hold_however_late_that_is_seen(
 @pytest.mark.parametrize(("hidden", "good"), [((9.0, 9.1), True), ((3.5, 4.4), False)])
 def test_what_cannot_be_seen_does_not_count(hidden: tuple[float, float], good: bool) -> None:
     script = Script(
-        [Spell("converging", 0.5, 2.9), Spell("touching", 2.9, 4.7), Spell("coupled", 3.0, 4.7)],
+        [
+            RelationSpan("converging", 0.5, 2.9),
+            RelationSpan("touching", 2.9, 4.7),
+            RelationSpan("coupled", 3.0, 4.7),
+        ],
         objects={ARM: (0.0, 4.7), SATELLITE: (0.0, 1e9)},
         hidden={ARM: hidden},
     )
@@ -94,7 +98,7 @@ def test_what_held_before_the_stage_began_does_not_count(until: float, good: boo
     <hold> ::= already coupled(arm, satellite) for 1 s
     """
     script = Script(
-        [Spell("touching", 0.5, until), Spell("coupled", 0.5, until)],
+        [RelationSpan("touching", 0.5, until), RelationSpan("coupled", 0.5, until)],
         objects={ARM: (0.0, until), SATELLITE: (0.0, 1e9)},
     )
     assert (finish(task_of(watch(script, 7.0, text))) is Verdict.SUCCEEDED) == good

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from tests.tasks.scripted import Played, Script, Spell, play
+from tests.tasks.scripted import RelationSpan, Script, ScriptedRun, play
 from visup.agent import Status, TaskBelief, Verdict
 from visup.tasks import parse_task
 from visup.tasks.supervision.supervise import task_reasoner
@@ -29,24 +29,26 @@ def _named(pair: tuple[int, int]) -> str:
 
 def script(count: int, relation: str, lasts_s: float, of: tuple[int, ...]) -> Script:
     """Stages one after the other, in some order, each between its own pair."""
-    spells = tuple(
-        Spell(relation, t, t + lasts_s, PAIRS[i])
+    spans = tuple(
+        RelationSpan(relation, t, t + lasts_s, PAIRS[i])
         for t, i in zip((1.0 + EVERY_S * k for k in range(count)), of, strict=True)
     )
     number = max(3, count)
     return Script(
-        spells,
+        spans,
         objects=dict.fromkeys(range(1, number + 1), (0.0, 1000000000.0)),
         identities={i: {f"m{i}": 0.9} for i in range(1, number + 1)},
     )
 
 
-def followed(count: int, action: str, relation: str, lasts_s: float, of: tuple[int, ...]) -> Played:
+def followed(
+    count: int, action: str, relation: str, lasts_s: float, of: tuple[int, ...]
+) -> ScriptedRun:
     reasoner = task_reasoner([parse_task(any_order(count, action))])
     return play(reasoner, script(count, relation, lasts_s, of), 1.0 + EVERY_S * count + 4.0)
 
 
-def belief(played: Played, time: float) -> TaskBelief:
+def belief(played: ScriptedRun, time: float) -> TaskBelief:
     return played.at(time).tasks[0]
 
 
@@ -89,7 +91,7 @@ def test_the_confidence_in_a_stage_is_the_mass_of_all_orders_in_which_it_is_done
 
 
 def test_before_anything_is_seen_no_stage_of_several_is_told_to_have_begun() -> None:
-    quiet = replace(script(3, "touching", 2.0, (0, 1, 2)), spells=())
+    quiet = replace(script(3, "touching", 2.0, (0, 1, 2)), spans=())
     played = play(task_reasoner([parse_task(any_order(3, "touching"))]), quiet, 3.0)
     told = played.last.tasks[0]
     assert {s.status for s in told.stages} == {Status.PENDING}
@@ -104,8 +106,8 @@ def test_a_false_alarm_counts_once_however_long_it_lasts() -> None:
         "<t> ::= <near> <still>\n<near> ::= converging(arm, satellite)\n"
         "<still> ::= keeping_distance(arm, satellite) for 2 s"
     )
-    spells = (Spell("keeping_distance", 0.0, 8.0), Spell("converging", 8.0, 12.0))
-    played = play(task_reasoner([parse_task(text)]), Script(spells), 11.0)
+    spans = (RelationSpan("keeping_distance", 0.0, 8.0), RelationSpan("converging", 8.0, 12.0))
+    played = play(task_reasoner([parse_task(text)]), Script(spans), 11.0)
     assert belief(played, 7.5).current == "near"
     assert belief(played, 11.0).current == "near"
 
@@ -117,12 +119,12 @@ def test_what_contradicts_two_actions_of_a_stage_counts_once() -> None:
         "<meet> ::= touching(arm, satellite)\n<haul> ::= moving_together(arm, satellite) "
         "& keeping_distance(arm, satellite) fails when diverging(arm, satellite)"
     )
-    spells = (
-        Spell("converging", 0.0, 5.6),
-        Spell("touching", 4.5, 7.0),
-        Spell("diverging", 7.0, 14.0),
+    spans = (
+        RelationSpan("converging", 0.0, 5.6),
+        RelationSpan("touching", 4.5, 7.0),
+        RelationSpan("diverging", 7.0, 14.0),
     )
-    played = play(task_reasoner([parse_task(text)]), Script(spells), 12.0)
+    played = play(task_reasoner([parse_task(text)]), Script(spans), 12.0)
     assert belief(played, 6.5).current == "haul"
     status = {s.stage: s.status for s in belief(played, 7.8).stages}
     assert status == {"approach": Status.DONE, "meet": Status.DONE, "haul": Status.FAILING}

@@ -8,7 +8,7 @@ from itertools import permutations
 import pytest
 
 from tests.rules.predicates.test_certainty import mind_of
-from tests.tasks.scripted import Played, Script, Spell, play, task_of
+from tests.tasks.scripted import RelationSpan, Script, ScriptedRun, play, task_of
 from visup.agent import Relation, Status, Truth, Verdict
 from visup.tasks import parse_task
 from visup.tasks.supervision.supervise import finish, task_reasoner
@@ -22,11 +22,11 @@ TWO = "<t> ::= <a> <b>\n<a> ::= touching(leg_1, top)\n<b> ::= {}touching(leg_2, 
 
 def scene(*meetings: tuple[int, float]) -> Script:
     """Legs that meet the top, each from a time on; `(3, 5.0)`: the second leg from 5 s."""
-    spells = tuple(Spell("touching", since, 1e9, (TOP, leg)) for leg, since in meetings)
-    return Script(spells, objects=HERE, identities=NAMES)
+    spans = tuple(RelationSpan("touching", since, 1e9, (TOP, leg)) for leg, since in meetings)
+    return Script(spans, objects=HERE, identities=NAMES)
 
 
-def watched(text: str, script: Script, until: float = 30.0) -> Played:
+def watched(text: str, script: Script, until: float = 30.0) -> ScriptedRun:
     return play(task_reasoner([parse_task(text)]), script, until)
 
 
@@ -53,7 +53,7 @@ THREE = (
 )
 
 
-def told_early(played: Played, since: float) -> list[str]:
+def told_early(played: ScriptedRun, since: float) -> list[str]:
     """The stages that are told to fail within 4 s since a later one was done."""
     events = (e for e in played.events if e.kind == "stage_failing" and e.time < since + 4.0)
     return [str(e.data["stage"]) for e in events if "before the turn of" in e.text]
@@ -84,13 +84,13 @@ def test_what_may_be_so_is_not_told_to_be_out_of_order(
 
 @pytest.mark.parametrize(("until", "told"), [(5.5, False), (8.0, True)])
 def test_what_is_undone_is_done_again_in_its_turn(until: float, told: bool) -> None:
-    spells = (
-        Spell("touching", 4.0, until, (TOP, 4)),
-        Spell("touching", 10.0, 1e9, (TOP, 2)),
-        Spell("touching", 14.0, 1e9, (TOP, 3)),
-        Spell("touching", 18.0, 1e9, (TOP, 4)),
+    spans = (
+        RelationSpan("touching", 4.0, until, (TOP, 4)),
+        RelationSpan("touching", 10.0, 1e9, (TOP, 2)),
+        RelationSpan("touching", 14.0, 1e9, (TOP, 3)),
+        RelationSpan("touching", 18.0, 1e9, (TOP, 4)),
     )
-    played = watched(THREE.format("", ""), Script(spells, objects=HERE, identities=NAMES))
+    played = watched(THREE.format("", ""), Script(spans, objects=HERE, identities=NAMES))
     assert bool(told_early(played, 4.0)) is told
     assert finish(task_of(played)) is Verdict.SUCCEEDED
 
@@ -106,20 +106,20 @@ def test_what_is_not_undone_stays_out_of_order_though_the_rest_is_done() -> None
 
 
 @pytest.mark.parametrize(
-    ("last", "spells"),
+    ("last", "spans"),
     [
         # It is so before anything is done.
-        ("apart(leg_3, top)", (Spell("touching", 0.0, 4.0, (TOP, 4)),)),
+        ("apart(leg_3, top)", (RelationSpan("touching", 0.0, 4.0, (TOP, 4)),)),
         # What the first stage has left behind goes on.
-        ("coupled(leg_1, top)", (Spell("coupled", 6.0, 1e9, (TOP, 2)),)),
+        ("coupled(leg_1, top)", (RelationSpan("coupled", 6.0, 1e9, (TOP, 2)),)),
     ],
 )
 def test_what_is_no_work_or_goes_on_is_not_out_of_order(
-    last: str, spells: tuple[Spell, ...]
+    last: str, spans: tuple[RelationSpan, ...]
 ) -> None:
     text = THREE.format("", "").replace("touching(leg_3, top)", last)
-    spells += (Spell("touching", 2.0, 1e9, (TOP, 2)),) if "coupled" in last else ()
-    played = watched(text, Script(spells, objects=HERE, identities=NAMES), 12.0)
+    spans += (RelationSpan("touching", 2.0, 1e9, (TOP, 2)),) if "coupled" in last else ()
+    played = watched(text, Script(spans, objects=HERE, identities=NAMES), 12.0)
     assert not any("before the turn of" in e.text for e in played.events)
 
 
@@ -133,13 +133,13 @@ def test_already_takes_what_was_so_before(since: float) -> None:
 
 
 def test_what_ceases_and_becomes_so_again_is_done_in_its_turn() -> None:
-    spells = (
-        Spell("touching", 10.0, 1e9, (TOP, 2)),
-        Spell("touching", 2.0, 12.0, (TOP, 3)),
-        Spell("touching", 18.0, 1e9, (TOP, 3)),
+    spans = (
+        RelationSpan("touching", 10.0, 1e9, (TOP, 2)),
+        RelationSpan("touching", 2.0, 12.0, (TOP, 3)),
+        RelationSpan("touching", 18.0, 1e9, (TOP, 3)),
     )
     assert (
-        verdict(TWO.format(""), Script(spells, objects=HERE, identities=NAMES)) is Verdict.SUCCEEDED
+        verdict(TWO.format(""), Script(spans, objects=HERE, identities=NAMES)) is Verdict.SUCCEEDED
     )
 
 
@@ -183,13 +183,13 @@ def test_a_failure_may_be_recovered_from_where_a_way_out_is_said() -> None:
         "on failure of <grasp>: diverging(leg_1, top) converging(leg_1, top) <grasp>"
     )
     pair = (TOP, 2)
-    spells = (
-        Spell("converging", 1.0, 5.0, pair),
-        Spell("diverging", 5.0, 10.0, pair),
-        Spell("converging", 10.0, 14.0, pair),
-        Spell("touching", 14.0, 1e9, pair),
+    spans = (
+        RelationSpan("converging", 1.0, 5.0, pair),
+        RelationSpan("diverging", 5.0, 10.0, pair),
+        RelationSpan("converging", 10.0, 14.0, pair),
+        RelationSpan("touching", 14.0, 1e9, pair),
     )
-    script = Script(spells, objects=HERE, identities=NAMES)
+    script = Script(spans, objects=HERE, identities=NAMES)
     assert verdict(text, script) is Verdict.SUCCEEDED
 
 
@@ -210,10 +210,10 @@ def test_what_touches_and_stands_above_is_on_the_other(
 def test_what_has_met_does_not_fail_to_approach_by_fingers_that_close(met: bool) -> None:
     text = "<t> ::= <near> <off>\n<near> ::= converging(leg_1, top)\n<off> ::= gone(leg_1)"
     pair = (TOP, 2)
-    spells = [Spell("converging", 1.0, 5.0, pair), Spell("diverging", 5.5, 7.0, pair)]
+    spans = [RelationSpan("converging", 1.0, 5.0, pair), RelationSpan("diverging", 5.5, 7.0, pair)]
     if met:
-        spells += [Spell(n, 5.0, 1e9, pair) for n in ("touching", "in_contact")]
-    played = watched(text, Script(tuple(spells), objects=HERE, identities=NAMES), 7.0)
+        spans += [RelationSpan(n, 5.0, 1e9, pair) for n in ("touching", "in_contact")]
+    played = watched(text, Script(tuple(spans), objects=HERE, identities=NAMES), 7.0)
     failing = [e for e in played.events if e.kind == "stage_failing" and "`near`" in e.text]
     assert bool(failing) is not met
 
@@ -227,8 +227,11 @@ UNDO = (
 @pytest.mark.parametrize(("until", "expected"), [(16.0, True), (6.0, False), (4.0, False)])
 def test_what_undoes_an_earlier_stage_has_its_turn_too(until: float, expected: bool) -> None:
     """Let down before the wheel is changed: the order is not that of the task."""
-    spells = (Spell("coupled", 2.0, until, (TOP, 2)), Spell("touching", 10.0, 1e9, (TOP, 3)))
-    script = Script(spells, objects=HERE, identities=NAMES)
+    spans = (
+        RelationSpan("coupled", 2.0, until, (TOP, 2)),
+        RelationSpan("touching", 10.0, 1e9, (TOP, 3)),
+    )
+    script = Script(spans, objects=HERE, identities=NAMES)
     assert (verdict(UNDO, script) is Verdict.SUCCEEDED) is expected
 
 
@@ -240,12 +243,12 @@ BOTH = (
 
 @pytest.mark.parametrize(("until", "expected"), [(8.0, False), (14.0, True)])
 def test_what_is_joined_by_and_holds_at_the_same_time(until: float, expected: bool) -> None:
-    spells = (
-        Spell("touching", 2.0, 18.0, (TOP, 2)),
-        Spell("touching", 5.0, until, (TOP, 3)),
-        Spell("touching", 12.0, 16.0, (TOP, 4)),
+    spans = (
+        RelationSpan("touching", 2.0, 18.0, (TOP, 2)),
+        RelationSpan("touching", 5.0, until, (TOP, 3)),
+        RelationSpan("touching", 12.0, 16.0, (TOP, 4)),
     )
-    played = watched(BOTH, Script(spells, objects=HERE, identities=NAMES), 40.0)
+    played = watched(BOTH, Script(spans, objects=HERE, identities=NAMES), 40.0)
     assert (finish(task_of(played)) is Verdict.SUCCEEDED) is expected
     assert expected is not any("not while what is joined" in e.text for e in played.events)
 
@@ -267,23 +270,23 @@ LONG = (
 def test_a_for_around_actions_counts_while_all_of_them_hold(
     first: tuple[float, float], second: tuple[float, float], expected: bool
 ) -> None:
-    spells = (
-        Spell("touching", 2.0, 1e9, (TOP, 2)),
-        Spell("touching", *first, (TOP, 3)),
-        Spell("touching", *second, (TOP, 4)),
+    spans = (
+        RelationSpan("touching", 2.0, 1e9, (TOP, 2)),
+        RelationSpan("touching", *first, (TOP, 3)),
+        RelationSpan("touching", *second, (TOP, 4)),
     )
-    script = Script(spells, objects=HERE, identities=NAMES)
+    script = Script(spans, objects=HERE, identities=NAMES)
     assert (verdict(LONG, script, 30.0) is Verdict.SUCCEEDED) is expected
 
 
 def test_a_for_around_actions_bears_a_short_break_of_one() -> None:
-    spells = (
-        Spell("touching", 2.0, 1e9, (TOP, 2)),
-        Spell("touching", 5.0, 1e9, (TOP, 3)),
-        Spell("touching", 5.0, 7.0, (TOP, 4)),
-        Spell("touching", 7.3, 1e9, (TOP, 4)),
+    spans = (
+        RelationSpan("touching", 2.0, 1e9, (TOP, 2)),
+        RelationSpan("touching", 5.0, 1e9, (TOP, 3)),
+        RelationSpan("touching", 5.0, 7.0, (TOP, 4)),
+        RelationSpan("touching", 7.3, 1e9, (TOP, 4)),
     )
-    script = Script(spells, objects=HERE, identities=NAMES)
+    script = Script(spans, objects=HERE, identities=NAMES)
     assert verdict(LONG, script, 30.0) is Verdict.SUCCEEDED
 
 
@@ -303,12 +306,12 @@ def test_stages_joined_by_and_go_on_side_by_side() -> None:
         "<q> ::= touching(leg_2, top) apart(leg_2, top)\n<e> ::= touching(leg_3, top)"
     )
     for first, second in (((2.0, 9.0), (5.0, 12.0)), ((2.0, 5.0), (9.0, 12.0))):
-        spells = (
-            Spell("touching", *first, (TOP, 2)),
-            Spell("touching", *second, (TOP, 3)),
-            Spell("touching", 16.0, 1e9, (TOP, 4)),
+        spans = (
+            RelationSpan("touching", *first, (TOP, 2)),
+            RelationSpan("touching", *second, (TOP, 3)),
+            RelationSpan("touching", 16.0, 1e9, (TOP, 4)),
         )
-        script = Script(spells, objects=HERE, identities=NAMES)
+        script = Script(spans, objects=HERE, identities=NAMES)
         assert verdict(text, script) is Verdict.SUCCEEDED
 
 
@@ -322,7 +325,9 @@ def test_what_follows_eight_touches_in_any_order_is_reached(lasts: float) -> Non
     text += "\n<c> ::= touching(leg_9, top)"
     meetings = [(leg, 2.0 + 2 * k, 2.0 + 2 * k + lasts) for k, leg in enumerate(order)]
     meetings.append((10, 20.0, 1e9))
-    spells = tuple(Spell("touching", since, until, (TOP, leg)) for leg, since, until in meetings)
-    script = Script(spells, objects=dict.fromkeys(names, (0.0, 1e9)), identities=names)
+    spans = tuple(
+        RelationSpan("touching", since, until, (TOP, leg)) for leg, since, until in meetings
+    )
+    script = Script(spans, objects=dict.fromkeys(names, (0.0, 1e9)), identities=names)
     played = play(task_reasoner([parse_task(text)]), script, 24.0, fps=10.0)
     assert finish(task_of(played)) is Verdict.SUCCEEDED

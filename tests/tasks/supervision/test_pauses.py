@@ -8,7 +8,7 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from tests.tasks.scripted import Played, Script, Spell, mind_at, play, task_of
+from tests.tasks.scripted import RelationSpan, Script, ScriptedRun, mind_at, play, task_of
 from visup.agent import Mind, Observation, Status, Truth, Verdict
 from visup.tasks import parse_task
 from visup.tasks.supervision.supervise import finish, task_reasoner
@@ -36,18 +36,18 @@ UNEVEN = 1 / 0.19
 UNTIL = 24
 
 
-def script(spells: list[Spell]) -> Script:
-    return Script(tuple(spells), objects=dict.fromkeys(NAMES, (0.0, 1e9)), identities=NAMES)
+def script(spans: list[RelationSpan]) -> Script:
+    return Script(tuple(spans), objects=dict.fromkeys(NAMES, (0.0, 1e9)), identities=NAMES)
 
 
-def paused_for(begins: float, lasts: float) -> Spell:
-    return Spell("touching", begins, begins + lasts, (ARM, GUARD))
+def paused_for(begins: float, lasts: float) -> RelationSpan:
+    return RelationSpan("touching", begins, begins + lasts, (ARM, GUARD))
 
 
 def cut(text: str, scene: Script) -> list[tuple[int, Mind]]:
     """What comes of the same recording with the pauses cut out, by the number of the frame."""
     reasoner, mind, lost, before = task_reasoner([parse_task(text)]), Mind(), 0.0, 0.0
-    guarded = [s for s in scene.spells if GUARD in s.objects]
+    guarded = [s for s in scene.spans if GUARD in s.objects]
     frames: list[tuple[int, Mind]] = []
     spans: list[tuple[float, float]] = []
     for index in range(round(UNTIL * UNEVEN) + 1):
@@ -77,8 +77,8 @@ def statuses(mind: Mind) -> list[tuple[str, Status]]:
 tenths = st.integers(0, 10 * UNTIL).map(lambda n: n / 10 + 0.037)
 pairs = st.sampled_from([(ARM, PART), (PART, TRAY)])
 names = st.sampled_from(["converging", "diverging", "touching", "coupled", "moving_together"])
-spell = st.builds(
-    lambda name, pair, at, lasts: Spell(name, at, at + lasts, pair),
+span = st.builds(
+    lambda name, pair, at, lasts: RelationSpan(name, at, at + lasts, pair),
     names, pairs, tenths, st.integers(5, 80).map(lambda n: n / 10),
 )  # fmt: skip
 guarding = st.builds(
@@ -88,12 +88,12 @@ guarding = st.builds(
 
 @settings(max_examples=8, phases=[Phase.explicit, Phase.generate])
 @given(
-    st.sampled_from(TASKS), st.lists(spell, max_size=7), st.lists(guarding, min_size=1, max_size=3)
+    st.sampled_from(TASKS), st.lists(span, max_size=7), st.lists(guarding, min_size=1, max_size=3)
 )
 def test_a_pause_is_as_if_it_were_cut_out_of_the_recording(
-    text: str, spells: list[Spell], pauses: list[Spell]
+    text: str, spans: list[RelationSpan], pauses: list[RelationSpan]
 ) -> None:
-    scene = script([*spells, *pauses])
+    scene = script([*spans, *pauses])
     played = play(task_reasoner([parse_task(text.format(PAUSE))]), scene, UNTIL, UNEVEN)
     for index, twin in cut(text.format(""), scene):
         mind = played.minds[index]
@@ -107,14 +107,16 @@ GRASP = """<put>   ::= <grasp> <lift>
 <lift>  ::= converging(part, tray) for 1 s"""
 
 
-def watched(clauses: str, *spells: Spell, text: str = GRASP, until: float = 20.0) -> Played:
+def watched(
+    clauses: str, *spans: RelationSpan, text: str = GRASP, until: float = 20.0
+) -> ScriptedRun:
     reasoner = task_reasoner([parse_task(text.format(clauses))])
-    return play(reasoner, script(list(spells)), until, FPS)
+    return play(reasoner, script(list(spans)), until, FPS)
 
 
-TOUCH = Spell("touching", 1.0, 4.0, (ARM, PART))
-AGAIN = Spell("touching", 9.0, 14.0, (ARM, PART))
-LIFT = Spell("converging", 14.0, 19.0, (PART, TRAY))
+TOUCH = RelationSpan("touching", 1.0, 4.0, (ARM, PART))
+AGAIN = RelationSpan("touching", 9.0, 14.0, (ARM, PART))
+LIFT = RelationSpan("converging", 14.0, 19.0, (PART, TRAY))
 
 
 @pytest.mark.parametrize(
@@ -137,9 +139,9 @@ def test_a_time_limit_around_more_than_is_paused_goes_on(inside: bool) -> None:
     clauses = f"within 4 s {PAUSE}" if inside else f"{PAUSE}"
     text = "<put> ::= <grasp>\n<grasp> ::= touching(arm, part) for 3 s {}"
     text = text if inside else text.replace("<grasp>\n", "<grasp> within 4 s\n")
-    spells = (Spell("touching", 0.0, 2.0, (ARM, PART)), paused_for(1.8, 8.4))
-    again = Spell("touching", 10.0, 20.0, (ARM, PART))
-    played = watched(clauses, *spells, again, text=text)
+    spans = (RelationSpan("touching", 0.0, 2.0, (ARM, PART)), paused_for(1.8, 8.4))
+    again = RelationSpan("touching", 10.0, 20.0, (ARM, PART))
+    played = watched(clauses, *spans, again, text=text)
     assert (finish(task_of(played)) is Verdict.SUCCEEDED) == inside
 
 
@@ -184,12 +186,12 @@ def test_what_pauses_is_told_in_words(condition: str, why: str) -> None:
 
 def test_what_must_never_be_counts_in_a_pause() -> None:
     text = GRASP + "\nnever touching(part, tray)"
-    spells = (TOUCH, paused_for(3.0, 6.0), Spell("touching", 5.0, 7.0, (PART, TRAY)))
-    assert finish(task_of(watched(PAUSE, *spells, text=text))) is Verdict.INTERRUPTED
+    spans = (TOUCH, paused_for(3.0, 6.0), RelationSpan("touching", 5.0, 7.0, (PART, TRAY)))
+    assert finish(task_of(watched(PAUSE, *spans, text=text))) is Verdict.INTERRUPTED
 
 
 def test_a_stage_that_was_failing_stays_so() -> None:
-    away = Spell("diverging", 3.0, 30.0, (ARM, PART))
+    away = RelationSpan("diverging", 3.0, 30.0, (ARM, PART))
     played = watched(f"for 6 s {PAUSE}", TOUCH, away, paused_for(6.0, 12.0))
     assert {task_of(played, t).stages[0].status for t in (5.8, 8.0, 17.0)} == {Status.FAILING}
     assert not [e for e in played.events if e.kind == "stage_paused"]
@@ -202,7 +204,7 @@ def test_what_pauses_may_have_to_last() -> None:
 
 
 def test_what_is_not_seen_any_more_pauses_for_two_seconds() -> None:
-    hold = Spell("touching", 1.0, 20.0, (ARM, PART))
+    hold = RelationSpan("touching", 1.0, 20.0, (ARM, PART))
     scene = replace(script([hold, paused_for(2.0, 2.0)]), hidden={GUARD: (4.0, 9.0)})
     reasoner = task_reasoner([parse_task(GRASP.format(f"for 12 s {PAUSE}"))])
     played = play(reasoner, scene, 10.0, FPS)
@@ -212,8 +214,8 @@ def test_what_is_not_seen_any_more_pauses_for_two_seconds() -> None:
 
 def test_pauses_around_and_inside_both_count() -> None:
     text = "<put> ::= (<grasp> pauses when touching(guard, part))\n<grasp> ::= touching(arm, part) for 4 s {}"
-    other = Spell("touching", 8.0, 12.0, (PART, GUARD))
-    hold = Spell("touching", 1.0, 20.0, (ARM, PART))
+    other = RelationSpan("touching", 8.0, 12.0, (PART, GUARD))
+    hold = RelationSpan("touching", 1.0, 20.0, (ARM, PART))
     played = watched(PAUSE, hold, paused_for(2.0, 4.0), other, text=text)
     stage = [task_of(played, t).stages[0].status for t in (3.0, 7.0, 9.0)]
     assert stage == [Status.PAUSED, Status.PROGRESSING, Status.PAUSED]

@@ -7,7 +7,7 @@ from math import nan, sin
 
 import pytest
 
-from tests.tasks.scripted import Played, Script, Spell, play
+from tests.tasks.scripted import RelationSpan, Script, ScriptedRun, play
 from visup.agent import Status, Verdict
 from visup.tasks import parse_task
 from visup.tasks.supervision.supervise import finish, task_reasoner
@@ -16,10 +16,10 @@ TASK = """<keep> ::= <near> <stay>
 <near> ::= converging(arm, satellite)
 <stay> ::= gap(arm, satellite) between 20 px and 100 px for 10 s"""
 ALONE = TASK.splitlines()[2]
-NEAR = (Spell("converging", 0.0, 4.0), Spell("diverging", 8.0, 30.0))
+NEAR = (RelationSpan("converging", 0.0, 4.0), RelationSpan("diverging", 8.0, 30.0))
 
 
-def lived(gaps: Callable[[float], float], task: str = TASK, until: float = 25.0) -> Played:
+def lived(gaps: Callable[[float], float], task: str = TASK, until: float = 25.0) -> ScriptedRun:
     return play(task_reasoner([parse_task(task)]), Script(NEAR, gaps=gaps), until, fps=5.0)
 
 

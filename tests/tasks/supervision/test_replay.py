@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.tasks.scripted import ARM, IDENTITIES, SATELLITE, Script, Spell, mind_at
+from tests.tasks.scripted import ARM, IDENTITIES, SATELLITE, RelationSpan, Script, mind_at
 from visup.agent import Mind, Observation, Status, TaskBelief, Verdict
 from visup.tasks import parse_task
 from visup.tasks.supervision.replay import EVERY_S, MEMORY_S
@@ -20,29 +20,35 @@ DOCK = """<dock> ::= <approach> <captured> <leave>
 <captured> ::= coupled(arm, satellite)
 <leave> ::= diverging(arm, satellite) for 1 s"""
 GOOD = (
-    Spell("converging", 1.0, 4.0),
-    Spell("touching", 4.0, 12.0),
-    Spell("coupled", 5.0, 12.0),
-    Spell("diverging", 12.0, 16.0),
+    RelationSpan("converging", 1.0, 4.0),
+    RelationSpan("touching", 4.0, 12.0),
+    RelationSpan("coupled", 5.0, 12.0),
+    RelationSpan("diverging", 12.0, 16.0),
 )
 # It was never coupled: the arm came, touched, and went.
-MISSED = (Spell("converging", 1.0, 4.0), Spell("touching", 4.0, 5.0), Spell("diverging", 5.0, 16.0))
+MISSED = (
+    RelationSpan("converging", 1.0, 4.0),
+    RelationSpan("touching", 4.0, 5.0),
+    RelationSpan("diverging", 5.0, 16.0),
+)
 NOBODY: Mapping[int, Mapping[str, float]] = {}
 
 
-def lived(named_at: Mapping[int, float], spells: tuple[Spell, ...], until: float = 16.0) -> Mind:
+def lived(
+    named_at: Mapping[int, float], spans: tuple[RelationSpan, ...], until: float = 16.0
+) -> Mind:
     """What is believed in the end where objects are named at some times."""
     reasoner, mind = task_reasoner([parse_task(DOCK)]), Mind()
     for index in range(round(until * 10) + 1):
         now = index / 10
         known = {i: IDENTITIES[i] for i, t in named_at.items() if now >= t}
-        mind = mind_at(Script(spells, identities=known), now, index, mind)
+        mind = mind_at(Script(spans, identities=known), now, index, mind)
         mind = reasoner(mind, Observation(index, now, (640, 480))).mind
     return mind
 
 
-def told(named_at: Mapping[int, float], spells: tuple[Spell, ...]) -> TaskBelief:
-    return lived(named_at, spells).tasks[0]
+def told(named_at: Mapping[int, float], spans: tuple[RelationSpan, ...]) -> TaskBelief:
+    return lived(named_at, spans).tasks[0]
 
 
 def statuses(belief: TaskBelief) -> list[Status]:

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.tasks.scripted import Played, Script, Spell, play, task_of
+from tests.tasks.scripted import RelationSpan, Script, ScriptedRun, play, task_of
 from visup.agent import Status, Truth, Verdict
 from visup.rules.formula.truth import truth_if
 from visup.tasks import parse_task
@@ -65,11 +65,11 @@ def test_while_nobody_listens_no_time_passes() -> None:
 
 
 def wiped(
-    onsets: Sequence[float], until: float, text: str = WIPE, more: Sequence[Spell] = ()
-) -> Played:
-    spells = [Spell("touching", at, at + 0.6, (WIPER, GLASS)) for at in onsets]
+    onsets: Sequence[float], until: float, text: str = WIPE, more: Sequence[RelationSpan] = ()
+) -> ScriptedRun:
+    spans = [RelationSpan("touching", at, at + 0.6, (WIPER, GLASS)) for at in onsets]
     objects = dict.fromkeys(NAMES, (0.0, 1e9))
-    script = Script((*spells, *more), objects=objects, identities=NAMES)
+    script = Script((*spans, *more), objects=objects, identities=NAMES)
     return play(task_reasoner([parse_task(text)]), script, until, FPS)
 
 
@@ -91,7 +91,7 @@ def test_it_goes_on_until_what_comes_next_begins() -> None:
     text = """<clean> ::= <wipe> <done>
     <wipe> ::= touching(wiper, glass) every 4 s
     <done> ::= touching(cup, glass)"""
-    played = wiped(IN_TIME, 22.0, text, [Spell("touching", 17.0, 22.0, (CUP, GLASS))])
+    played = wiped(IN_TIME, 22.0, text, [RelationSpan("touching", 17.0, 22.0, (CUP, GLASS))])
     assert task_of(played, 15.0).stages[0].status is Status.PROGRESSING
     assert finish(task_of(played)) is Verdict.SUCCEEDED
 
@@ -108,7 +108,7 @@ def test_that_it_is_out_of_time_is_told_and_that_it_recovers() -> None:
 
 def test_a_pause_stops_its_clock() -> None:
     text = WIPE + " pauses when touching(cup, wiper)"
-    pause = Spell("touching", 7.9, 14.1, (CUP, WIPER))
+    pause = RelationSpan("touching", 7.9, 14.1, (CUP, WIPER))
     onsets = (1.0, 4.0, 7.0, 16.0, 19.0, 22.0)
     assert finish(task_of(wiped(onsets, 24.0, text, [pause]))) is Verdict.SUCCEEDED
     assert finish(task_of(wiped(onsets, 24.0))) is Verdict.FAILED
@@ -117,7 +117,7 @@ def test_a_pause_stops_its_clock() -> None:
 def test_it_may_stand_in_conditions_and_invariants() -> None:
     text = """<hold> ::= touching(cup, glass) for 10 s fails when not touching(wiper, glass) every 4 s
     always touching(wiper, glass) every 6 s for 2 s"""
-    hold = [Spell("touching", 1.0, 30.0, (CUP, GLASS))]
+    hold = [RelationSpan("touching", 1.0, 30.0, (CUP, GLASS))]
     assert finish(task_of(wiped(IN_TIME, 14.0, text, hold))) is Verdict.SUCCEEDED
     late = wiped((1.0,), 8.0, text, hold)
     assert task_of(late).stages[0].status is Status.FAILING

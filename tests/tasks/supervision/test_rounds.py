@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.tasks.scripted import Played, Script, Spell, mind_at, play, task_of
+from tests.tasks.scripted import RelationSpan, Script, ScriptedRun, mind_at, play, task_of
 from visup.agent import Event, Observation, Status, Verdict
 from visup.agent.storage.checkpoint import dump_state, load_state
 from visup.tasks import parse_task
@@ -39,35 +39,33 @@ def written_out(order: Sequence[int]) -> str:
 
 def emptied(order: Sequence[int], *, alike: bool = True, leaves: bool = True) -> Script:
     """A bin out of which parts are taken in an order, each for 4 s; one taken again was put back."""
-    spells = []
+    spans = []
     for part in range(PARTS):
         back = 0.0
         for taken in (2.0 + EVERY_S * k for k, p in enumerate(order) if p == part):
-            spells.append(Spell("touching", back, taken + 1.5, (BIN, FIRST + part)))
-            spells.append(Spell("touching", taken, taken + 4.5, (ARM, FIRST + part)))
-            spells.append(Spell("coupled", taken + 0.5, taken + 4.5, (ARM, FIRST + part)))
+            spans.append(RelationSpan("touching", back, taken + 1.5, (BIN, FIRST + part)))
+            spans.append(RelationSpan("touching", taken, taken + 4.5, (ARM, FIRST + part)))
+            spans.append(RelationSpan("coupled", taken + 0.5, taken + 4.5, (ARM, FIRST + part)))
             back = taken + 5.5
         if part not in order:
-            spells.append(Spell("touching", 0.0, 1e9, (BIN, FIRST + part)))
+            spans.append(RelationSpan("touching", 0.0, 1e9, (BIN, FIRST + part)))
     end = 2.0 + EVERY_S * len(order)
-    spells.append(Spell("touching", 0.5, end if leaves else 1e9, (ARM, BIN)))
+    spans.append(RelationSpan("touching", 0.5, end if leaves else 1e9, (ARM, BIN)))
     names = {FIRST + k: {"part" if alike else f"part_{k}": 0.9} for k in range(PARTS)}
     names |= {ARM: {"arm": 0.9}, BIN: {"bin": 0.9}}
-    return Script(
-        tuple(spells), objects=dict.fromkeys(names, (0.0, 1000000000.0)), identities=names
-    )
+    return Script(tuple(spans), objects=dict.fromkeys(names, (0.0, 1000000000.0)), identities=names)
 
 
-def watched(text: str, script: Script, rounds: int) -> Played:
+def watched(text: str, script: Script, rounds: int) -> ScriptedRun:
     until = 2.0 + EVERY_S * rounds + 6.0
     return play(task_reasoner([parse_task(text)]), script, until, fps=4.0)
 
 
-def verdict(played: Played) -> Verdict:
+def verdict(played: ScriptedRun) -> Verdict:
     return finish(task_of(played))
 
 
-def done(played: Played) -> list[int]:
+def done(played: ScriptedRun) -> list[int]:
     """The parts whose rounds were told complete, by what their objects are."""
     told = [e for e in played.events if e.kind == "stage_done" and "take" in e.data["stage"]]
     bound = {b.actor: b.object_id for b in task_of(played).bindings}
@@ -140,16 +138,18 @@ def test_a_run_that_is_taken_up_again_in_a_round_goes_on_as_if_it_had_not_been_l
     assert events == [e for e in whole.events if e.time > 4.0]
 
 
-def repeated(text: str, touches: Sequence[tuple[float, float]], last_s: float | None) -> Played:
+def repeated(
+    text: str, touches: Sequence[tuple[float, float]], last_s: float | None
+) -> ScriptedRun:
     """A task about contacts `<a>` between arm and bin, and `<c>` between arm and part."""
-    spells = [Spell("touching", *touch, (ARM, BIN)) for touch in touches]
+    spans = [RelationSpan("touching", *touch, (ARM, BIN)) for touch in touches]
     if last_s is not None:
-        spells.append(Spell("touching", last_s, 1e9, (ARM, FIRST)))
+        spans.append(RelationSpan("touching", last_s, 1e9, (ARM, FIRST)))
     names = {ARM: {"arm": 0.9}, BIN: {"bin": 0.9}, FIRST: {"part": 0.9}}
     here = dict.fromkeys(names, (0.0, 1e9))
     stages = "\n<a> ::= touching(arm, bin)\n<b> ::= apart(arm, bin)\n<c> ::= touching(arm, part)"
     used = "\n".join(x for x in stages.splitlines() if x[:3] in text)
-    script = Script(tuple(spells), objects=here, identities=names)
+    script = Script(tuple(spans), objects=here, identities=names)
     return play(task_reasoner([parse_task(f"<t> ::= {text}\n{used}")]), script, 24.0)
 
 
@@ -190,9 +190,12 @@ def test_an_actor_whose_turn_is_missing_is_not_passed_over() -> None:
     text = "<t> ::= for each thing of (bin, part) <meet(thing)> <leave>\n"
     text += "<meet(thing)> ::= touching(arm, thing)\n<leave> ::= apart(arm, bin) for 2 s"
     names = {ARM: {"arm": 0.9}, BIN: {"bin": 0.9}, FIRST: {"part": 0.9}}
-    spells = [Spell("touching", 2.0, 4.0, (ARM, FIRST)), Spell("touching", 6.0, 8.0, (ARM, BIN))]
+    spans = [
+        RelationSpan("touching", 2.0, 4.0, (ARM, FIRST)),
+        RelationSpan("touching", 6.0, 8.0, (ARM, BIN)),
+    ]
     for count, expected in ((1, False), (2, True)):
         here = dict.fromkeys(names, (0.0, 1e9))
-        script = Script(tuple(spells[:count]), objects=here, identities=names)
+        script = Script(tuple(spans[:count]), objects=here, identities=names)
         played = play(task_reasoner([parse_task(text)]), script, 20.0)
         assert (verdict(played) is Verdict.SUCCEEDED) is expected

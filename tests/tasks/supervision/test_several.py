@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import pytest
 
-from tests.tasks.scripted import Played, Script, Spell, play
+from tests.tasks.scripted import RelationSpan, Script, ScriptedRun, play
 from visup.agent import Status, TaskBelief, Verdict
 from visup.runs.wiring import final_verdict
 from visup.tasks import parse_task
@@ -26,37 +26,37 @@ LEAVE = parse_task("""<leave> ::= <away> <clear>
 <clear> ::= keeping_distance(arm, satellite) for 2 s
 """)
 DOCKS = (
-    Spell("converging", 0.5, 12.3),
-    Spell("touching", 12.0, 30),
-    Spell("moving_together", 12.6, 30),
-    Spell("coupled", 13.0, 30),
+    RelationSpan("converging", 0.5, 12.3),
+    RelationSpan("touching", 12.0, 30),
+    RelationSpan("moving_together", 12.6, 30),
+    RelationSpan("coupled", 13.0, 30),
 )
 FAILS = (
-    Spell("converging", 0.5, 12.3),
-    Spell("touching", 12.0, 12.8),
-    Spell("diverging", 12.8, 30),
+    RelationSpan("converging", 0.5, 12.3),
+    RelationSpan("touching", 12.0, 12.8),
+    RelationSpan("diverging", 12.8, 30),
 )
-INSPECTS = (Spell("converging", 0.5, 10.0), Spell("keeping_distance", 10.2, 30))
+INSPECTS = (RelationSpan("converging", 0.5, 10.0), RelationSpan("keeping_distance", 10.2, 30))
 PARTS = (
-    Spell("touching", 0.0, 8.0),
-    Spell("moving_together", 0.0, 8.0),
-    Spell("coupled", 0.0, 8.0),
-    Spell("diverging", 8.2, 16),
-    Spell("keeping_distance", 16.2, 18.8),
+    RelationSpan("touching", 0.0, 8.0),
+    RelationSpan("moving_together", 0.0, 8.0),
+    RelationSpan("coupled", 0.0, 8.0),
+    RelationSpan("diverging", 8.2, 16),
+    RelationSpan("keeping_distance", 16.2, 18.8),
 )
 
 
-def watch(spells: tuple[Spell, ...], until: float = 26.0) -> Played:
-    return play(task_reasoner([DOCK, INSPECT, LEAVE]), Script(spells), until)
+def watch(spans: tuple[RelationSpan, ...], until: float = 26.0) -> ScriptedRun:
+    return play(task_reasoner([DOCK, INSPECT, LEAVE]), Script(spans), until)
 
 
-def belief(played: Played, task: str, time: float | None = None) -> TaskBelief:
+def belief(played: ScriptedRun, task: str, time: float | None = None) -> TaskBelief:
     mind = played.last if time is None else played.at(time)
     return next(t for t in mind.tasks if t.task == task)
 
 
 @pytest.mark.parametrize(
-    ("spells", "task", "verdict"),
+    ("spans", "task", "verdict"),
     [
         (DOCKS, "dock", Verdict.SUCCEEDED),
         (FAILS, "dock", Verdict.FAILED),
@@ -65,9 +65,9 @@ def belief(played: Played, task: str, time: float | None = None) -> TaskBelief:
     ],
 )
 def test_the_task_that_is_going_on_decides(
-    spells: tuple[Spell, ...], task: str, verdict: Verdict
+    spans: tuple[RelationSpan, ...], task: str, verdict: Verdict
 ) -> None:
-    played = watch(spells)
+    played = watch(spans)
     assert final_verdict(played.last) is verdict
     ends = {(e.data["task"], e.data["verdict"]) for e in played.events if e.kind == "verdict"}
     assert ends == {(task, str(verdict))}
@@ -83,8 +83,8 @@ def test_tasks_with_the_same_beginning_are_both_told_of_until_they_differ() -> N
 
 
 def test_a_task_that_is_not_going_on_is_not_told_to_fail() -> None:
-    for spells in (DOCKS, INSPECTS, PARTS):
-        played = watch(spells)
+    for spans in (DOCKS, INSPECTS, PARTS):
+        played = watch(spans)
         failing = [e.text for e in played.events if e.kind in ("stage_failing", "stage_failed")]
         assert failing == []
         assert not any(o.conditions for o in played.outcomes)

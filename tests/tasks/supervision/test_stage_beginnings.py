@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.tasks.scripted import ARM, IDENTITIES, INTRUDER, SATELLITE, Script, Spell, watch
+from tests.tasks.scripted import ARM, IDENTITIES, INTRUDER, SATELLITE, RelationSpan, Script, watch
 from visup.tasks.supervision import stage_beginnings
 
 APPROACH = "<t> ::= converging(arm, satellite)"
@@ -22,7 +22,7 @@ def test_two_that_rest_from_the_start_begin_nothing() -> None:
 
 @pytest.mark.parametrize("since", [2.0, 5.5])
 def test_two_that_rest_begin_when_they_near_each_other(since: float) -> None:
-    script = Script((Spell("converging", since, 12.0),))
+    script = Script((RelationSpan("converging", since, 12.0),))
     assert begun(script, APPROACH)["t"] == pytest.approx(since, abs=0.3)
 
 
@@ -31,9 +31,11 @@ def test_who_comes_later_begins_the_task_by_coming() -> None:
     assert begun(Script(objects=objects), APPROACH)["t"] == pytest.approx(3.0, abs=0.11)
 
 
-def carried(*spells: Spell) -> Script:
-    held = Spell("touching", 2.0, 20.0), Spell("coupled", 2.5, 20.0)
-    return Script((Spell("converging", 0.5, 2.0), *held, *spells), THREE, identities=IDENTITIES)
+def carried(*spans: RelationSpan) -> Script:
+    held = RelationSpan("touching", 2.0, 20.0), RelationSpan("coupled", 2.5, 20.0)
+    return Script(
+        (RelationSpan("converging", 0.5, 2.0), *held, *spans), THREE, identities=IDENTITIES
+    )
 
 
 CARRY = """
@@ -46,15 +48,15 @@ actor dish is dish
 
 
 def test_a_stage_of_two_things_begins_with_the_first_that_comes_about() -> None:
-    nears = Spell("converging", 8.0, 12.0, (SATELLITE, INTRUDER))
-    script = carried(Spell("moving_together", 5.0, 12.0), nears)
+    nears = RelationSpan("converging", 8.0, 12.0, (SATELLITE, INTRUDER))
+    script = carried(RelationSpan("moving_together", 5.0, 12.0), nears)
     assert begun(script, CARRY)["carry"] == pytest.approx(5.0, abs=0.4)
 
 
 def test_what_the_stage_before_asked_for_already_does_not_begin_the_next() -> None:
     text = CARRY.replace("coupled(arm, satellite)", "moving_together(arm, satellite)")
-    nears = Spell("converging", 8.0, 12.0, (SATELLITE, INTRUDER))
-    script = carried(Spell("moving_together", 3.0, 12.0), nears)
+    nears = RelationSpan("converging", 8.0, 12.0, (SATELLITE, INTRUDER))
+    script = carried(RelationSpan("moving_together", 3.0, 12.0), nears)
     assert begun(script, text)["carry"] == pytest.approx(8.0, abs=0.4)
 
 
@@ -69,15 +71,15 @@ def test_a_first_stage_of_two_things_begins_with_what_was_not_so_from_the_start(
     since: float,
 ) -> None:
     """A giver holds its payload all the time: an offer begins when the receiver comes."""
-    held = Spell("touching", 0.0, 20.0), Spell("coupled", 0.5, 20.0)
-    nears = Spell("converging", since, 12.0, (SATELLITE, INTRUDER))
+    held = RelationSpan("touching", 0.0, 20.0), RelationSpan("coupled", 0.5, 20.0)
+    nears = RelationSpan("converging", since, 12.0, (SATELLITE, INTRUDER))
     script = Script((*held, nears), THREE, identities=IDENTITIES)
     assert begun(script, OFFER)["t"] == pytest.approx(since, abs=0.4)
 
 
 def test_a_first_stage_of_two_things_begins_with_either_that_comes_about() -> None:
-    meets = Spell("touching", 3.0, 20.0), Spell("coupled", 3.5, 20.0)
-    nears = Spell("converging", 8.0, 12.0, (SATELLITE, INTRUDER))
+    meets = RelationSpan("touching", 3.0, 20.0), RelationSpan("coupled", 3.5, 20.0)
+    nears = RelationSpan("converging", 8.0, 12.0, (SATELLITE, INTRUDER))
     script = Script((*meets, nears), THREE, identities=IDENTITIES)
     assert begun(script, OFFER)["t"] == pytest.approx(3.0, abs=0.4)
 
@@ -90,7 +92,7 @@ def test_a_first_stage_of_two_things_begins_as_all_who_come_set_out(
 ) -> None:
     """The giver brings its payload; the offer begins when the receiver, who is named first, sets out, too."""
     monkeypatch.setattr(stage_beginnings, "moving_bodies", lambda mind: frozenset(movers))
-    nears = Spell("converging", 8.0, 12.0, (SATELLITE, INTRUDER))
+    nears = RelationSpan("converging", 8.0, 12.0, (SATELLITE, INTRUDER))
     script = Script((nears,), THREE, identities=IDENTITIES)
     assert begun(script, OFFER)["t"] == pytest.approx(at, abs=0.4)
 
@@ -111,8 +113,8 @@ RETREAT = """
 
 
 def retreat(leaves: float) -> Script:
-    near, hold = Spell("converging", 0.5, 2.0), Spell("touching", 2.0, leaves)
-    return Script((near, hold, Spell("diverging", leaves, 12.0)))
+    near, hold = RelationSpan("converging", 0.5, 2.0), RelationSpan("touching", 2.0, leaves)
+    return Script((near, hold, RelationSpan("diverging", leaves, 12.0)))
 
 
 @pytest.mark.parametrize("leaves", [4.0, 6.5])
@@ -134,7 +136,7 @@ def test_no_stage_is_dated_before_the_one_before_it_or_after_its_report() -> Non
 
 def test_what_lasted_from_before_is_dated_to_the_end_of_the_stage_before_it() -> None:
     text = RETREAT.replace("touching(arm, satellite)", "keeping_distance(arm, satellite) for 3 s")
-    keeps, drifts = Spell("keeping_distance", 2.0, 9.0), Spell("diverging", 3.0, 12.0)
-    script = Script((Spell("converging", 0.5, 2.0), keeps, drifts))
+    keeps, drifts = RelationSpan("keeping_distance", 2.0, 9.0), RelationSpan("diverging", 3.0, 12.0)
+    script = Script((RelationSpan("converging", 0.5, 2.0), keeps, drifts))
     told, began = dated(script, text)["away"]
     assert 5.0 - 0.11 <= began <= told

@@ -13,9 +13,9 @@ from tests.tasks.scripted import (
     DOCK,
     INTRUDER,
     SATELLITE,
-    Played,
+    RelationSpan,
     Script,
-    Spell,
+    ScriptedRun,
     play,
     task_of,
     watch,
@@ -25,27 +25,27 @@ from visup.tasks import load_task
 from visup.tasks.supervision.supervise import finish, task_reasoner
 
 FAILS = (
-    Spell("converging", 0.5, 12.3),
-    Spell("touching", 12.0, 12.8),
-    Spell("diverging", 12.8, 30),
+    RelationSpan("converging", 0.5, 12.3),
+    RelationSpan("touching", 12.0, 12.8),
+    RelationSpan("diverging", 12.8, 30),
 )
 SUCCEEDS = (
-    Spell("converging", 0.5, 12.3),
-    Spell("touching", 12.0, 30),
-    Spell("moving_together", 12.6, 30),
-    Spell("coupled", 13.0, 30),
+    RelationSpan("converging", 0.5, 12.3),
+    RelationSpan("touching", 12.0, 30),
+    RelationSpan("moving_together", 12.6, 30),
+    RelationSpan("coupled", 13.0, 30),
 )
-ABORTED = (Spell("converging", 0.5, 11.5), Spell("diverging", 12.5, 20))
+ABORTED = (RelationSpan("converging", 0.5, 11.5), RelationSpan("diverging", 12.5, 20))
 CROWDED = {ARM: (0.0, 1e9), SATELLITE: (0.0, 1e9), INTRUDER: (6.5, 1e9)}
 
 
-def status(played: Played, stage: str, time: float | None = None) -> Status:
+def status(played: ScriptedRun, stage: str, time: float | None = None) -> Status:
     return next(s.status for s in task_of(played, time).stages if s.stage == stage)
 
 
 def test_capture_fails_as_in_the_paper() -> None:
     played = watch(Script(FAILS), 30.0)
-    told = [(k, s) for k, s in played.told() if k not in ("stage_progressing", "stage_failed")]
+    told = [(k, s) for k, s in played.reported() if k not in ("stage_progressing", "stage_failed")]
     assert told == [
         ("stage_started", "approach"),
         ("stage_done", "approach"),
@@ -76,10 +76,15 @@ def test_capture_succeeds() -> None:
 
 
 def test_what_was_told_complete_and_is_not_is_told_so() -> None:
-    let_go = Spell("coupled", 13.0, 15.0), Spell("moving_together", 12.6, 15.0)
+    let_go = RelationSpan("coupled", 13.0, 15.0), RelationSpan("moving_together", 12.6, 15.0)
     played = watch(
         Script(
-            (*SUCCEEDS[:1], Spell("touching", 12.0, 15.0), *let_go, Spell("diverging", 15.0, 30))
+            (
+                *SUCCEEDS[:1],
+                RelationSpan("touching", 12.0, 15.0),
+                *let_go,
+                RelationSpan("diverging", 15.0, 30),
+            )
         ),
         18.0,
     )
@@ -163,17 +168,29 @@ def test_what_is_not_seen_is_unknown_and_never_a_failure() -> None:
 
 
 def test_an_approach_without_progress_is_stalled_and_goes_on() -> None:
-    spells = (Spell("converging", 0, 5), Spell("converging", 11, 15), Spell("touching", 15, 30))
-    played = watch(Script(spells), 16.0)
+    spans = (
+        RelationSpan("converging", 0, 5),
+        RelationSpan("converging", 11, 15),
+        RelationSpan("touching", 15, 30),
+    )
+    played = watch(Script(spans), 16.0)
     assert status(played, "approach", 10.0) is Status.STALLED
     assert status(played, "approach", 12.0) is Status.PROGRESSING
     assert status(played, "approach") is Status.DONE
 
 
 def test_a_short_contrary_is_no_failure_and_a_recovery_ends_one() -> None:
-    brief = (Spell("converging", 0, 5), Spell("diverging", 5, 5.4), Spell("converging", 5.4, 9))
-    assert "stage_failing" not in dict(watch(Script(brief), 9.0).told())
-    longer = (Spell("converging", 0, 5), Spell("diverging", 5, 7), Spell("converging", 7, 12))
+    brief = (
+        RelationSpan("converging", 0, 5),
+        RelationSpan("diverging", 5, 5.4),
+        RelationSpan("converging", 5.4, 9),
+    )
+    assert "stage_failing" not in dict(watch(Script(brief), 9.0).reported())
+    longer = (
+        RelationSpan("converging", 0, 5),
+        RelationSpan("diverging", 5, 7),
+        RelationSpan("converging", 7, 12),
+    )
     played = watch(Script(longer), 12.0)
     assert status(played, "approach", 6.5) is Status.FAILING
     assert status(played, "approach") is Status.PROGRESSING
@@ -181,8 +198,12 @@ def test_a_short_contrary_is_no_failure_and_a_recovery_ends_one() -> None:
 
 
 def test_what_has_failed_goes_on_only_when_it_went_well_for_as_long() -> None:
-    spells = (Spell("converging", 0, 5), Spell("diverging", 5, 15), Spell("converging", 15, 30))
-    played = watch(Script(spells), 25.0)
+    spans = (
+        RelationSpan("converging", 0, 5),
+        RelationSpan("diverging", 5, 15),
+        RelationSpan("converging", 15, 30),
+    )
+    played = watch(Script(spans), 25.0)
     assert task_of(played, 14.5).verdict is Verdict.FAILED
     assert task_of(played, 22.0).verdict is Verdict.FAILED
     assert status(played, "approach") is Status.PROGRESSING
@@ -191,14 +212,14 @@ def test_what_has_failed_goes_on_only_when_it_went_well_for_as_long() -> None:
 
 def bobbing(nearest: float) -> Script:
     """Two that met part again, to 40 pixels, and then draw nearer for a while."""
-    spells = (
-        Spell("converging", 0, 4),
-        Spell("touching", 4, 6),
-        Spell("diverging", 6, 9),
-        Spell("converging", 10, 14),
+    spans = (
+        RelationSpan("converging", 0, 4),
+        RelationSpan("touching", 4, 6),
+        RelationSpan("diverging", 6, 9),
+        RelationSpan("converging", 10, 14),
     )
     times, gaps = (0.0, 4.0, 6.0, 9.0, 10.0, 13.0), (80.0, 0.0, 0.0, 40.0, 40.0, nearest)
-    return Script(spells, gaps=lambda t: float(np.interp(t, times, gaps)))
+    return Script(spans, gaps=lambda t: float(np.interp(t, times, gaps)))
 
 
 @pytest.mark.parametrize(("nearest", "mended"), [(36.0, False), (24.0, False), (8.0, True)])
@@ -211,10 +232,10 @@ def test_who_has_parted_recovers_by_coming_back_half_the_way(nearest: float, men
 
 def test_a_capture_that_is_lost_at_once_is_no_success() -> None:
     lost = (
-        Spell("converging", 0, 12),
-        Spell("touching", 12, 14.5),
-        Spell("coupled", 12.2, 14.0),
-        Spell("diverging", 14.5, 30),
+        RelationSpan("converging", 0, 12),
+        RelationSpan("touching", 12, 14.5),
+        RelationSpan("coupled", 12.2, 14.0),
+        RelationSpan("diverging", 14.5, 30),
     )
     played = watch(Script(lost), 30.0)
     assert task_of(played, 13.8).verdict is Verdict.SUCCEEDED
@@ -233,20 +254,20 @@ def test_what_the_stage_asks_for_is_expected_and_so_is_the_entry_to_the_next() -
 
 RETRY = load_task("dock_with_retry")
 TWICE = (
-    Spell("converging", 0, 5),
-    Spell("diverging", 6, 10),
-    Spell("converging", 11, 15),
-    Spell("diverging", 16, 18),
-    Spell("converging", 19, 25),
-    Spell("touching", 25, 40),
-    Spell("coupled", 26, 40),
+    RelationSpan("converging", 0, 5),
+    RelationSpan("diverging", 6, 10),
+    RelationSpan("converging", 11, 15),
+    RelationSpan("diverging", 16, 18),
+    RelationSpan("converging", 19, 25),
+    RelationSpan("touching", 25, 40),
+    RelationSpan("coupled", 26, 40),
 )
 
 
 def test_a_task_that_allows_a_retry_takes_a_retreat_for_one() -> None:
     played = play(task_reasoner([RETRY]), Script(TWICE), 30.0)
     assert task_of(played).verdict is Verdict.SUCCEEDED
-    assert "stage_failing" not in dict(played.told())
+    assert "stage_failing" not in dict(played.reported())
     assert task_of(played, 8.0).current == "back_off"
     assert task_of(played, 14.0).current == "approach"
     assert finish(task_of(watch(Script(TWICE), 20.0))) is not Verdict.SUCCEEDED
@@ -271,21 +292,21 @@ SCENES = {"fails": (FAILS, 24.0), "succeeds": (SUCCEEDS, 24.0), "aborted": (ABOR
 
 
 @cache
-def watched(name: str) -> Played:
-    spells, until = SCENES[name]
-    return watch(Script(spells), until, fps=10.0)
+def watched(name: str) -> ScriptedRun:
+    spans, until = SCENES[name]
+    return watch(Script(spans), until, fps=10.0)
 
 
 @settings(max_examples=15, deadline=None)
 @given(st.sampled_from(sorted(SCENES)), st.floats(0.0, 20.0))
 def test_shifting_a_scene_in_time_shifts_its_story(name: str, shift: float) -> None:
-    spells, until = SCENES[name]
+    spans, until = SCENES[name]
     shift = round(shift, 1)
-    moved = tuple(replace(s, from_s=s.from_s + shift, to_s=s.to_s + shift) for s in spells)
+    moved = tuple(replace(s, from_s=s.from_s + shift, to_s=s.to_s + shift) for s in spans)
     objects = {ARM: (shift, 1e9), SATELLITE: (shift, 1e9)}
     one = watched(name)
     other = watch(Script(moved, objects=objects), until + shift, fps=10.0)
-    assert other.told() == one.told()
+    assert other.reported() == one.reported()
     for a, b in zip(one.events, other.events, strict=True):
         assert b.time - a.time == pytest.approx(shift, abs=0.11)
 
@@ -293,8 +314,8 @@ def test_shifting_a_scene_in_time_shifts_its_story(name: str, shift: float) -> N
 @pytest.mark.parametrize("fps", [4.0, 10.0, 25.0])
 @pytest.mark.parametrize("name", sorted(SCENES))
 def test_the_story_does_not_hang_on_the_frame_rate(name: str, fps: float) -> None:
-    spells, until = SCENES[name]
-    assert watch(Script(spells), until, fps=fps).told() == watched(name).told()
+    spans, until = SCENES[name]
+    assert watch(Script(spans), until, fps=fps).reported() == watched(name).reported()
 
 
 def test_a_reasoner_is_a_pure_function_and_keeps_nothing_to_itself() -> None:
@@ -315,16 +336,16 @@ def test_several_tasks_are_supervised_side_by_side() -> None:
 @pytest.mark.parametrize("share", [0.05, 0.1])
 def test_now_and_then_wrong_relations_do_not_change_the_verdict(share: float) -> None:
     for seed in range(4):
-        for name, (spells, until) in SCENES.items():
-            noisy = _with_noise(spells, until, share, seed)
+        for name, (spans, until) in SCENES.items():
+            noisy = _with_noise(spans, until, share, seed)
             verdict = finish(task_of(watch(Script(noisy), until)))
             wanted = Verdict.SUCCEEDED if name == "succeeds" else Verdict.FAILED
             assert verdict is wanted, (name, seed)
 
 
 def _with_noise(
-    spells: tuple[Spell, ...], until: float, share: float, seed: int
-) -> tuple[Spell, ...]:
+    spans: tuple[RelationSpan, ...], until: float, share: float, seed: int
+) -> tuple[RelationSpan, ...]:
     """Single frames in which something false is seen or nothing is known."""
     import random
 
@@ -334,5 +355,5 @@ def _with_noise(
         if rng.random() < share:
             name = rng.choice(["converging", "diverging", "keeping_distance", "touching"])
             truth = rng.choice([Truth.TRUE, Truth.UNKNOWN, Truth.FALSE])
-            wrong.append(Spell(name, i / 10, (i + 1) / 10 - 1e-6, truth=truth))
-    return (*wrong, *spells)
+            wrong.append(RelationSpan(name, i / 10, (i + 1) / 10 - 1e-6, truth=truth))
+    return (*wrong, *spans)

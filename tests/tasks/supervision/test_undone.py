@@ -11,8 +11,8 @@ from tests.tasks.scripted import (
     IDENTITIES,
     INTRUDER,
     SATELLITE,
+    RelationSpan,
     Script,
-    Spell,
     play,
     task_of,
     watch,
@@ -27,7 +27,7 @@ from visup.tasks.supervision.supervise import task_reasoner
 from visup.tasks.verification.step_monitor import entered
 
 THREE = {ARM: (0.0, 1e9), SATELLITE: (0.0, 1e9), INTRUDER: (0.0, 1e9)}
-MEETS = Spell("converging", 0.5, 2.0), Spell("touching", 2.0, 20.0)
+MEETS = RelationSpan("converging", 0.5, 2.0), RelationSpan("touching", 2.0, 20.0)
 
 CAPTURE = """
 <t>        ::= <approach> <captured>
@@ -69,10 +69,10 @@ def failing(script: Script, text: str) -> set[str]:
 )
 def test_who_is_in_contact_recedes_from_nobody(gap: float, contact: bool, fails: bool) -> None:
     later = Truth.TRUE if contact else Truth.UNKNOWN
-    meets = Spell("in_contact", 2.0, 3.0), Spell("in_contact", 3.0, 20.0, truth=later)
-    spells = (*MEETS, *meets, Spell("diverging", 4.0, 9.0))
+    meets = RelationSpan("in_contact", 2.0, 3.0), RelationSpan("in_contact", 3.0, 20.0, truth=later)
+    spans = (*MEETS, *meets, RelationSpan("diverging", 4.0, 9.0))
     known = (*Script().known, "in_contact")
-    script = Script(spells, gaps=lambda now: gap, known=known)
+    script = Script(spans, gaps=lambda now: gap, known=known)
     assert failing(script, CAPTURE) == ({"captured"} if fails else set())
 
 
@@ -85,13 +85,19 @@ def test_who_is_in_contact_recedes_from_nobody(gap: float, contact: bool, fails:
     ],
 )
 def test_a_grasp_that_takes_nothing_along_was_none(moved_s: float, again: bool, fails: str) -> None:
-    held = Spell("touching", 2.0, 6.0), Spell("coupled", 2.5, 6.0)
-    spells: tuple[Spell, ...] = (Spell("converging", 0.5, 2.0), *held, Spell("diverging", 6.0, 9.0))
-    spells += (Spell("moving_together", 6.0 - moved_s, 6.0),) if moved_s else ()
-    spells += (
-        (Spell("converging", 9.0, 10.0), Spell("moving_together", 10.0, 10.5)) if again else ()
+    held = RelationSpan("touching", 2.0, 6.0), RelationSpan("coupled", 2.5, 6.0)
+    spans: tuple[RelationSpan, ...] = (
+        RelationSpan("converging", 0.5, 2.0),
+        *held,
+        RelationSpan("diverging", 6.0, 9.0),
     )
-    assert failing(Script(spells), LIFT) == {fails}
+    spans += (RelationSpan("moving_together", 6.0 - moved_s, 6.0),) if moved_s else ()
+    spans += (
+        (RelationSpan("converging", 9.0, 10.0), RelationSpan("moving_together", 10.0, 10.5))
+        if again
+        else ()
+    )
+    assert failing(Script(spans), LIFT) == {fails}
 
 
 @pytest.mark.parametrize(
@@ -104,11 +110,15 @@ def test_a_grasp_that_takes_nothing_along_was_none(moved_s: float, again: bool, 
 def test_what_moves_without_its_gripper_was_not_taken_along(together_s: float, fails: str) -> None:
     lift = "moving_together(arm, satellite) & converging(satellite, dish)\n  fails"
     text = LIFT.replace("moving_together(arm, satellite) fails", lift)
-    nears = Spell("converging", 4.5, 12.0, (SATELLITE, INTRUDER))
-    held = Spell("touching", 2.0, 6.0), Spell("coupled", 2.5, 6.0)
-    spells: tuple[Spell, ...] = (Spell("converging", 0.5, 2.0), *held, Spell("diverging", 6.0, 9.0))
-    spells += (Spell("moving_together", 6.0 - together_s, 6.0),) if together_s else ()
-    script = Script((*spells, nears), THREE, identities=IDENTITIES)
+    nears = RelationSpan("converging", 4.5, 12.0, (SATELLITE, INTRUDER))
+    held = RelationSpan("touching", 2.0, 6.0), RelationSpan("coupled", 2.5, 6.0)
+    spans: tuple[RelationSpan, ...] = (
+        RelationSpan("converging", 0.5, 2.0),
+        *held,
+        RelationSpan("diverging", 6.0, 9.0),
+    )
+    spans += (RelationSpan("moving_together", 6.0 - together_s, 6.0),) if together_s else ()
+    script = Script((*spans, nears), THREE, identities=IDENTITIES)
     assert failing(script, f"actor dish is dish{text}") == {fails}
 
 
@@ -136,7 +146,10 @@ def test_what_two_do_together_does_not_begin_by_one_of_them_alone(
 def test_what_goes_wrong_with_another_one_undoes_no_grasp() -> None:
     text = LIFT.split("<lift>  ::=")[0] + "<lift>  ::= converging(satellite, dish)\n"
     text = f"actor dish is dish{text}"
-    goes = Spell("coupled", 2.5, 20.0), Spell("diverging", 5.0, 12.0, (SATELLITE, INTRUDER))
+    goes = (
+        RelationSpan("coupled", 2.5, 20.0),
+        RelationSpan("diverging", 5.0, 12.0, (SATELLITE, INTRUDER)),
+    )
     assert failing(Script((*MEETS, *goes), THREE, identities=IDENTITIES), text) == {"lift"}
 
 
@@ -148,11 +161,11 @@ def started(script: Script) -> set[str]:
 
 def test_after_a_broken_invariant_no_stage_goes_on() -> None:
     captured = (
-        Spell("converging", 0.5, 8.0),
-        Spell("touching", 8.0, 20.0),
-        Spell("coupled", 8.5, 20),
+        RelationSpan("converging", 0.5, 8.0),
+        RelationSpan("touching", 8.0, 20.0),
+        RelationSpan("coupled", 8.5, 20),
     )
-    touches = Spell("touching", 4.0, 6.0, (ARM, INTRUDER))
+    touches = RelationSpan("touching", 4.0, 6.0, (ARM, INTRUDER))
     alone = Script(captured, THREE, identities=IDENTITIES)
     assert started(alone) == {"approach", "captured"}
     assert started(Script((*captured, touches), THREE, identities=IDENTITIES)) == {"approach"}
@@ -164,8 +177,8 @@ def test_after_a_broken_invariant_no_stage_goes_on() -> None:
 
 
 def test_who_carries_something_there_is_expected_there() -> None:
-    moves = Spell("moving_together", 4.0, 12.0), Spell("coupled", 2.5, 20.0)
-    nears = Spell("converging", 5.0, 12.0, (SATELLITE, INTRUDER))
+    moves = RelationSpan("moving_together", 4.0, 12.0), RelationSpan("coupled", 2.5, 20.0)
+    nears = RelationSpan("converging", 5.0, 12.0, (SATELLITE, INTRUDER))
     played = watch(Script((*MEETS, *moves, nears), THREE, identities=IDENTITIES), 10.0, CARRY)
     comes = Expectation("converging", (ARM, INTRUDER))
     assert comes in task_of(played, 8.0).expected

@@ -79,7 +79,7 @@ def test_outlines_that_meet_while_passing(
     assert goes_past(mind, (TARGET, PART), lambda _: False) is past
 
 
-def gone(place: Callable[[float], tuple[float, float]], until: float) -> Mind:
+def mind_after(place: Callable[[float], tuple[float, float]], until: float) -> Mind:
     """The mind after a small body has moved beside a large one at rest."""
     large = box_region(TARGET, (300, 200, 120, 90))
     return reason(
@@ -93,7 +93,7 @@ def gone(place: Callable[[float], tuple[float, float]], until: float) -> Mind:
     [(2.5, True), (0.5, False)],  # while it passed, and long before the path that is remembered
 )
 def test_a_body_that_went_past_recedes_from_then_on(since: float, past: bool) -> None:
-    mind = gone(lambda t: (80 + 110 * t, 120), 3.2)
+    mind = mind_after(lambda t: (80 + 110 * t, 120), 3.2)
     assert went_past(mind, Relation("diverging", (PART, TARGET), Truth.TRUE, since)) is past
 
 
@@ -113,7 +113,7 @@ def test_a_body_without_known_path_has_not_gone_past() -> None:
 def test_going_round_still_counts_after_the_body_has_stopped(
     place: Callable[[float], tuple[float, float]], round_it: bool
 ) -> None:
-    mind = gone(place, 3.2)
+    mind = mind_after(place, 3.2)
     for objects in ((PART, TARGET), (TARGET, PART)):
         trend = Relation("diverging", objects, Truth.TRUE, 2.0)
         assert went_round(mind, trend) is round_it

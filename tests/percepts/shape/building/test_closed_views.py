@@ -13,7 +13,7 @@ from visup.percepts.shape.matching.shape_similarity import compare_shapes, shape
 from visup.percepts.shape.silhouette.silhouette import normalise
 
 
-def panels(gap: int) -> np.ndarray:
+def panels_mask(gap: int) -> np.ndarray:
     """Two panels on either end of a mast."""
     mask = np.zeros((200, 120), bool)
     mask[:, 56:64] = True
@@ -35,8 +35,8 @@ def test_closing_removes_nothing_and_small_gains_are_dropped(seed: int) -> None:
 
 @pytest.mark.parametrize("gap", [4, 8])
 def test_a_narrow_gap_is_filled(gap: int) -> None:
-    closed = without_gaps(panels(gap))
-    assert gap < 2 * CLOSING_RADIUS * panels(gap).sum() ** 0.5
+    closed = without_gaps(panels_mask(gap))
+    assert gap < 2 * CLOSING_RADIUS * panels_mask(gap).sum() ** 0.5
     assert closed is not None
     assert closed[18 : 18 + gap, 20:100].all()
 
@@ -47,16 +47,16 @@ def test_a_disc_has_no_gap() -> None:
 
 
 def test_a_filled_silhouette_matches_the_closed_view_better() -> None:
-    seen = panels(8)
+    seen = panels_mask(8)
     seen[18:26, 10:110] = seen[178:186, 10:110] = True
     shapes = [
         shape_of(s)
-        for m in (seen, panels(8), without_gaps(panels(8)))
+        for m in (seen, panels_mask(8), without_gaps(panels_mask(8)))
         if m is not None and (s := normalise(m)) is not None
     ]
     assert len(shapes) == 3
-    told, plain, closed = shapes
+    segmented, plain, closed = shapes
     assert (
-        compare_shapes(told, closed, rigid=True).similarity
-        > compare_shapes(told, plain, rigid=True).similarity + 0.1
+        compare_shapes(segmented, closed, rigid=True).similarity
+        > compare_shapes(segmented, plain, rigid=True).similarity + 0.1
     )

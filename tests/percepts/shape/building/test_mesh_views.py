@@ -18,7 +18,7 @@ trimesh = pytest.importorskip("trimesh", reason="views of meshes need the extra 
 pytest.importorskip("embreex", reason="views of meshes need the extra 'render'")
 
 
-def lopsided() -> object:
+def asymmetric_mesh() -> object:
     """A convex solid without any symmetry."""
     rng = np.random.default_rng(5)
     return trimesh.convex.convex_hull(rng.normal(size=(14, 3)) * [3.0, 1.5, 0.8])
@@ -35,7 +35,7 @@ def projected(mesh: object, orientation: NDArray[np.float64], size: int = 600) -
     return out.astype(bool)
 
 
-def tight(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def cropped(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     cropped = mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
     small = cv2.resize(cropped.astype(np.uint8) * 255, (64, 64), interpolation=cv2.INTER_AREA)
@@ -44,13 +44,13 @@ def tight(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_rendered_view_agrees_with_its_orientation(seed: int) -> None:
-    mesh = lopsided()
+    mesh = asymmetric_mesh()
     direction = np.random.default_rng(seed).normal(size=3)
     direction /= np.linalg.norm(direction)
-    rendered = tight(render_views(mesh, direction[None], 480)[0].mask)
+    rendered = cropped(render_views(mesh, direction[None], 480)[0].mask)
     upright = projected(mesh, orientations(direction, 0.0))
-    assert iou(rendered, tight(upright)) > 0.97
-    assert iou(rendered, tight(upright[:, ::-1])) < 0.95
+    assert iou(rendered, cropped(upright)) > 0.97
+    assert iou(rendered, cropped(upright[:, ::-1])) < 0.95
 
 
 @pytest.mark.parametrize("behind", [False, True])
@@ -58,7 +58,7 @@ def test_a_rendered_view_agrees_with_its_orientation(seed: int) -> None:
 def test_a_match_recovers_the_rendered_orientation(
     behind: bool, turn: float, tmp_path: Path
 ) -> None:
-    mesh = lopsided()
+    mesh = asymmetric_mesh()
     mesh.export(tmp_path / "solid.ply")  # type: ignore[attr-defined]
     database = build_database(tmp_path / "one.db", [tmp_path / "solid.ply"], views=24)
     view = database.views[7]

@@ -179,7 +179,7 @@ def turn_into_folder(path: Path) -> None:
     path.mkdir()
 
 
-def exchange(path: Path) -> None:
+def swap_shapes(path: Path) -> None:
     """Two sound rows change places."""
     with closing(sqlite3.connect(path)) as file, file:
         for a, b in ((0, 77), (1, 0), (77, 1)):
@@ -221,7 +221,7 @@ REFUSED: dict[str, tuple[Callable[[Path], object], str]] = {
     "bad mark": (in_block("cut", 7), "mark of a cut"),
     "bad smoothing": (in_block("smoothing", np.nan), "a smoothing"),
     "bad root": (in_block("profiles", np.nan), "profiles"),
-    "exchanged": (exchange, "check sum of the shape"),
+    "exchanged": (swap_shapes, "check sum of the shape"),
     "other root": (in_shape("nodes", lambda b: b[NODE.itemsize :] + b[: NODE.itemsize]), "root"),
     "bad kind": (in_shape("nodes", nodes_with("kinds", 9)), "no known kind"),
     "negative": (in_shape("nodes", nodes_with("lengths", -1.0)), "negative lengths"),

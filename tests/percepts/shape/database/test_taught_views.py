@@ -27,7 +27,7 @@ def picture(seed: int = 0, size: tuple[int, int] = (100, 140)) -> NDArray[np.uin
     return np.random.default_rng(seed).integers(0, 256, (*size, 3), dtype=np.uint8)
 
 
-def same(a: TaughtView, b: TaughtView) -> bool:
+def equal_views(a: TaughtView, b: TaughtView) -> bool:
     pixels = all(
         np.array_equal(getattr(a, part), getattr(b, part)) for part in ("image", "mask", "scene")
     )
@@ -51,7 +51,7 @@ def test_taught_views_are_read_back(
     view = taught_view_from_mask("a thing", picture(seed, (height, width)), mask)
     path = tmp_path_factory.mktemp("db") / "a.models"
     (read,) = ModelDatabase.open_or_new(path).teach([view]).taught
-    assert same(view, read)
+    assert equal_views(view, read)
 
 
 def test_teaching_adds_views_without_duplicates(tmp_path: Path) -> None:
@@ -61,7 +61,7 @@ def test_teaching_adds_views_without_duplicates(tmp_path: Path) -> None:
     assert database.names() == ("part", "tray")
     database = database.teach([second, first, second])
     assert [v.name for v in database.taught] == ["part", "tray", "part"]
-    assert same(database.taught[2], second)
+    assert equal_views(database.taught[2], second)
     assert len(database.views) == 0
 
 

@@ -22,7 +22,7 @@ def teach(path: Path, writer: int) -> None:
     ModelDatabase.open_or_new(path).teach([taught_view(f"thing {writer}", image, SQUARE)])
 
 
-def race(path: Path, writers: int) -> list[int]:
+def concurrent_writes(path: Path, writers: int) -> list[int]:
     """Let processes teach a thing each, at the same moment; their exit codes."""
     ready, go = os.pipe()
     children = []
@@ -48,7 +48,7 @@ def test_concurrent_writers_lose_no_taught_view(tmp_path: Path, begun: bool) -> 
         path = tmp_path / f"{k}.models"
         if begun:
             ModelDatabase.create(path)
-        assert race(path, 3) == [0, 0, 0]
+        assert concurrent_writes(path, 3) == [0, 0, 0]
         assert sorted(ModelDatabase.open(path).names()) == [f"thing {n}" for n in range(3)]
 
 

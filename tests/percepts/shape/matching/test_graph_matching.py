@@ -64,7 +64,7 @@ def random_tree(parents: list[int]) -> np.ndarray:
     return np.array(edges, dtype=np.int16).reshape(-1, 2)
 
 
-def worth(
+def hierarchy_factor(
     below_a: np.ndarray, below_b: np.ndarray, pair: tuple[int, int], taken: list[tuple[int, int]]
 ) -> float:
     """By how much a pair's value falls for the pairs that were taken before it."""
@@ -84,7 +84,7 @@ def by_brute_force(below_a: np.ndarray, below_b: np.ndarray, value: np.ndarray) 
         if not size:
             return total
         left = {
-            p: float(value[p]) * worth(below_a, below_b, p, taken)
+            p: float(value[p]) * hierarchy_factor(below_a, below_b, p, taken)
             for p in itertools.product(free_a, free_b)
         }
         matchings = [
@@ -113,7 +113,7 @@ def test_matching_agrees_with_brute_force(a: list[int], b: list[int], seed: int)
     assert len({u for u, _, _ in pairs}) == len({v for _, v, _ in pairs}) == len(pairs)
     taken: list[tuple[int, int]] = []
     for u, v, left in pairs:
-        share = worth(below_a, below_b, (u, v), taken)
+        share = hierarchy_factor(below_a, below_b, (u, v), taken)
         assert left == pytest.approx(float(value[u, v]) * share, abs=1e-6)
         taken.append((u, v))
     total = sum(left for _, _, left in pairs)

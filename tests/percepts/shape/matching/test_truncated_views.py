@@ -27,7 +27,7 @@ NAMES = sorted(ZOO)
 SIDES = {"right": 0.0, "bottom": np.pi / 2, "left": np.pi, "top": -np.pi / 2}
 
 
-def cut_off(mask: Mask, side: str, share: float) -> Mask:
+def truncated(mask: Mask, side: str, share: float) -> Mask:
     """The mask without a share of it beyond one side of the array."""
     turns = ("left", "top", "right", "bottom").index(side)
     turned = np.rot90(mask, turns)
@@ -49,7 +49,7 @@ def index() -> CutIndex:
 
 @pytest.mark.parametrize("side", SIDES)
 def test_the_cutting_side_is_found(side: str) -> None:
-    seen = silhouette(cut_off(ZOO["walker"], side, 0.2), cut=True)
+    seen = silhouette(truncated(ZOO["walker"], side, 0.2), cut=True)
     assert seen.border == pytest.approx(SIDES[side])
 
 
@@ -69,7 +69,7 @@ def test_only_given_sides_can_cut() -> None:
 @settings(max_examples=40, deadline=None)
 @given(st.sampled_from(NAMES), st.sampled_from(sorted(SIDES)), st.floats(0.08, 0.35), st.booleans())
 def test_a_cut_view_is_found_again(name: str, side: str, share: float, mirrored: bool) -> None:
-    mask = cut_off(ZOO[name][:, ::-1] if mirrored else ZOO[name], side, share)
+    mask = truncated(ZOO[name][:, ::-1] if mirrored else ZOO[name], side, share)
     seen = silhouette(mask, cut=True)
     assert seen.border is not None
     found = index().likeliest(query_map(seen.contour, seen.border), np.arange(len(NAMES)), 3)
@@ -84,7 +84,7 @@ def test_a_cut_view_is_found_again(name: str, side: str, share: float, mirrored:
 def test_the_share_cut_off_is_mostly_recovered() -> None:
     errors = []
     for name, side, share in product(NAMES, sorted(SIDES), np.linspace(0.08, 0.35, 10)):
-        seen = silhouette(cut_off(ZOO[name], side, share), cut=True)
+        seen = silhouette(truncated(ZOO[name], side, share), cut=True)
         assert seen.border is not None
         this = np.array([NAMES.index(name)])
         ((_, cut),) = index().likeliest(query_map(seen.contour, seen.border), this, 1)
@@ -117,7 +117,7 @@ def test_a_clipped_outline_equals_a_clipped_raster(
 
 
 def test_mirroring_a_map_twice_is_the_identity() -> None:
-    seen = silhouette(cut_off(ZOO["walker"], "left", 0.2), cut=True)
+    seen = silhouette(truncated(ZOO["walker"], "left", 0.2), cut=True)
     assert seen.border is not None
     own = query_map(seen.contour, seen.border)
     assert np.array_equal(mirrored_map(mirrored_map(own)), own)
@@ -125,7 +125,7 @@ def test_mirroring_a_map_twice_is_the_identity() -> None:
 
 
 def test_an_index_searches_only_the_given_views() -> None:
-    seen = silhouette(cut_off(ZOO["walker"], "top", 0.2), cut=True)
+    seen = silhouette(truncated(ZOO["walker"], "top", 0.2), cut=True)
     assert seen.border is not None
     own = query_map(seen.contour, seen.border)
     some = np.array([1, 3, 4])

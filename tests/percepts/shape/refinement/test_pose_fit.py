@@ -28,12 +28,12 @@ from visup.render.meshes.spacecraft import spartan
 FAR = 8.0
 
 
-def satellite() -> MeshModel:
+def satellite_mesh() -> MeshModel:
     mesh = spartan()
     return mesh_model("satellite", mesh.vertices, mesh.faces)
 
 
-def drawn(model: MeshModel, orientation: NDArray[np.float64]) -> RegionImage:
+def rendered_image(model: MeshModel, orientation: NDArray[np.float64]) -> RegionImage:
     """What a camera sees, lit from the upper left; drawn with the same loops."""
     side = (np.empty((len(model.vertices), 3)), np.empty((SIDE, SIDE)))
     number = np.empty((SIDE, SIDE), np.int32)
@@ -61,10 +61,10 @@ def nearby(true: NDArray[np.float64], away: float, seed: int) -> NDArray[np.floa
 
 
 def test_poses_are_recovered_from_nearby_starts() -> None:
-    model, errors = satellite(), []
+    model, errors = satellite_mesh(), []
     for seed in range(24):
         true = Rotation.random(random_state=seed).as_matrix()
-        picture = drawn(model, true)
+        picture = rendered_image(model, true)
         (best, *_) = fitted_poses(
             model, picture, [nearby(true, 0.25, seed)], focal_px=FAR * SIDE / 4
         )
@@ -76,8 +76,8 @@ def test_poses_are_recovered_from_nearby_starts() -> None:
 @settings(max_examples=10, deadline=None)
 @given(st.integers(0, 10_000), st.floats(0.0, 3.0))
 def test_a_search_never_ends_worse_than_it_began(seed: int, away: float) -> None:
-    model, true = satellite(), Rotation.random(random_state=seed).as_matrix()
-    picture, start = drawn(model, true), nearby(true, away, seed)
+    model, true = satellite_mesh(), Rotation.random(random_state=seed).as_matrix()
+    picture, start = rendered_image(model, true), nearby(true, away, seed)
     focal = FAR * SIDE / 4
     still = fitted_poses(model, picture, [start], steps=np.zeros(0), focal_px=focal)[0]
     best = fitted_poses(model, picture, [start], focal_px=focal)[0]
@@ -87,10 +87,10 @@ def test_a_search_never_ends_worse_than_it_began(seed: int, away: float) -> None
 
 def test_shading_distinguishes_a_view_from_its_mirror_image() -> None:
     """Seen from behind and mirrored, a satellite with a plane of symmetry has the same outline."""
-    model, right = satellite(), 0
+    model, right = satellite_mesh(), 0
     for seed in range(8):
         true = Rotation.random(random_state=seed).as_matrix()
-        picture = drawn(model, true)
+        picture = rendered_image(model, true)
         # Reflected in the image plane and in the object's own plane of symmetry.
         behind = np.diag([1.0, 1.0, -1.0]) @ true @ np.diag([1.0, -1.0, 1.0])
         best = fitted_poses(model, picture, [behind, true], focal_px=FAR * SIDE / 4)[0]
@@ -110,7 +110,7 @@ def test_a_large_mesh_is_simplified_and_keeps_its_size() -> None:
 
 
 def test_stored_meshes_round_trip() -> None:
-    model = satellite()
+    model = satellite_mesh()
     again = stored_mesh("satellite", model.radius, *mesh_bytes(model))
     assert np.array_equal(again.vertices, model.vertices)
     assert np.array_equal(again.faces, model.faces)
@@ -131,7 +131,7 @@ def test_a_damaged_mesh_is_refused(vertices: bytes, faces: bytes) -> None:
 
 
 def test_a_database_stores_the_meshes_of_its_models(tmp_path: Path) -> None:
-    model = satellite()
+    model = satellite_mesh()
     database = ModelDatabase.create(tmp_path / "db", [], [model])
     kept = ModelDatabase.open(database.path).meshes["satellite"]
     assert np.array_equal(kept.vertices, model.vertices)

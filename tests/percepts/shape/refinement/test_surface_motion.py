@@ -26,7 +26,7 @@ FINER = 4
 FAR = USUAL_FOCAL * SIDE / RADIUS_PX
 
 
-def satellite() -> MeshModel:
+def satellite_mesh() -> MeshModel:
     mesh = spartan()
     return mesh_model("satellite", mesh.vertices, mesh.faces)
 
@@ -46,7 +46,7 @@ def seen(model: MeshModel, turn: NDArray[np.float64], tones: int = 0) -> tuple[F
     return Frame(0, 0.0, np.repeat(grey[..., None], 3, axis=2)), region_of(cover > 0.5)
 
 
-def begun(model: MeshModel, true: NDArray[np.float64]) -> FollowedSurface:
+def surface_at(model: MeshModel, true: NDArray[np.float64]) -> FollowedSurface:
     frame, region = seen(model, true)
     picture = region_image(frame, region)
     focal = USUAL_FOCAL * SIDE
@@ -61,13 +61,13 @@ def apart_deg(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
 
 def test_a_rotation_is_measured_to_a_fraction_of_a_degree() -> None:
     """Most surely in the plane; a face seen from ahead tells little of others."""
-    model, errors, rolls = satellite(), [], []
+    model, errors, rolls = satellite_mesh(), [], []
     for seed in range(12):
         before = Rotation.random(random_state=seed).as_matrix()
         axis = np.random.default_rng(seed).normal(size=3)
         axis *= np.radians(4.0) / np.linalg.norm(axis)
         after = Rotation.from_rotvec(axis).as_matrix() @ before
-        numbers, (now, *_) = begun(model, before).current_orientations(*seen(model, after))
+        numbers, (now, *_) = surface_at(model, before).current_orientations(*seen(model, after))
         assert numbers.tolist() == [0]
         errors.append(apart_deg(now, after))
         rolls.append(np.degrees(abs(Rotation.from_matrix(now @ after.T).as_rotvec()[2])))
@@ -79,7 +79,7 @@ def test_a_rotation_is_measured_to_a_fraction_of_a_degree() -> None:
 def test_corners_of_the_outline_are_tracked_only_on_a_plain_background(
     textured: bool, near: bool
 ) -> None:
-    frame, region = seen(satellite(), np.eye(3))
+    frame, region = seen(satellite_mesh(), np.eye(3))
     mask = region.full_mask((SIDE, SIDE))
     if textured:
         noise = np.random.default_rng(2).integers(0, 255, (SIDE, SIDE, 3)).astype(np.uint8)
@@ -96,9 +96,9 @@ def test_corners_of_the_outline_are_tracked_only_on_a_plain_background(
 
 
 def test_another_surface_is_not_followed() -> None:
-    model, true = satellite(), Rotation.random(random_state=1).as_matrix()
+    model, true = satellite_mesh(), Rotation.random(random_state=1).as_matrix()
     other = Rotation.random(random_state=7).as_matrix()
-    numbers, _ = begun(model, true).current_orientations(*seen(model, other, tones=3))
+    numbers, _ = surface_at(model, true).current_orientations(*seen(model, other, tones=3))
     assert not len(numbers)
 
 
@@ -106,7 +106,7 @@ def test_another_surface_is_not_followed() -> None:
 def test_a_new_image_is_needed_after_a_large_rotation(degrees: float, worn: bool) -> None:
     true = Rotation.random(random_state=1).as_matrix()
     turned = Rotation.from_rotvec([0.0, np.radians(degrees), 0.0]).as_matrix() @ true
-    surface = begun(satellite(), true)
+    surface = surface_at(satellite_mesh(), true)
     assert surface.needs_new_image(np.array([0]), turned[None]) is worn
     assert surface.needs_new_image(np.array([], np.intp), np.zeros((0, 3, 3)))
 
@@ -115,7 +115,7 @@ def test_a_search_that_finds_a_followed_orientation_leaves_it_unchanged() -> Non
     known = Rotation.random(2, random_state=1).as_matrix()
     near = Rotation.from_rotvec([0.05, 0.0, 0.0]).as_matrix() @ known[1]
     fits = [PoseFit(near, 0.9, 0.5, 1.0, 4), PoseFit(known[0].T, 0.8, 0.5, 1.0, 3)]
-    surface = begun(satellite(), known[0])
+    surface = surface_at(satellite_mesh(), known[0])
     before = _KnownOrientations(known, (5, 6), surface, True)
     (first, second), told = before.with_followed_orientations(fits)
     assert told is None  # the surface says nothing of the second one
@@ -129,7 +129,7 @@ def test_the_surface_is_dropped_if_a_search_found_another_orientation() -> None:
     """It began from the second known one, and is far from it now: numbers alone do not tell that."""
     known = Rotation.random(2, random_state=1).as_matrix()
     fits = [PoseFit(known[0], 0.9, 0.5, 1.0, 0), PoseFit(known[0].T, 0.8, 0.5, 1.0, 1)]
-    surface = begun(satellite(), known[0])
+    surface = surface_at(satellite_mesh(), known[0])
     assert (
         _KnownOrientations(known, (5, 6), surface, True).with_followed_orientations(fits)[1] is None
     )

@@ -23,7 +23,7 @@ Mask = NDArray[np.bool_]
 NAMES = sorted(ZOO)
 
 
-def turned(mask: Mask, degrees: float, mirrored: bool) -> Mask:
+def transformed(mask: Mask, degrees: float, mirrored: bool) -> Mask:
     """Mirrored left to right if so wanted, then turned clockwise."""
     side = int(np.hypot(*mask.shape)) + 4
     tone = np.ascontiguousarray(mask[:, ::-1] if mirrored else mask).astype(np.float32)
@@ -37,7 +37,7 @@ def turned(mask: Mask, degrees: float, mirrored: bool) -> Mask:
 @given(st.sampled_from(NAMES), st.floats(-179, 179), st.booleans())
 def test_a_rotated_shape_overlaps_itself(name: str, degrees: float, mirrored: bool) -> None:
     own = area_map(ZOO[name])
-    found = area_overlaps(area_map(turned(ZOO[name], degrees, mirrored)), own[None])
+    found = area_overlaps(area_map(transformed(ZOO[name], degrees, mirrored)), own[None])
     assert found.similarity[0, int(mirrored)] > 0.97
 
 
@@ -46,7 +46,7 @@ def test_a_rotated_shape_overlaps_itself(name: str, degrees: float, mirrored: bo
 def test_the_rotation_is_recovered(degrees: float, mirrored: bool) -> None:
     shape = np.zeros((90, 120), dtype=bool)
     shape[30:60, 10:110] = shape[60:85, 15:30] = shape[10:30, 70:80] = True
-    found = area_overlaps(area_map(turned(shape, degrees, mirrored)), area_map(shape)[None])
+    found = area_overlaps(area_map(transformed(shape, degrees, mirrored)), area_map(shape)[None])
     off = np.degrees(found.rotation[0, int(mirrored)]) - degrees
     assert abs((off + 180) % 360 - 180) < 3
     assert found.similarity[0, int(mirrored)] > found.similarity[0, 1 - int(mirrored)]

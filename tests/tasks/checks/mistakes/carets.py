@@ -31,10 +31,10 @@ class Span:
 def points_at_culprit(place: SourceLocation, written: str, meant: str) -> bool:
     """Whether the caret of a message is at something that is written otherwise than meant."""
     caret = _span_of(place, written)
-    return any(caret.meets(culprit) for culprit in culprits(written, meant))
+    return any(caret.meets(culprit) for culprit in changed_spans(written, meant))
 
 
-def culprits(written: str, meant: str) -> Iterator[Span]:
+def changed_spans(written: str, meant: str) -> Iterator[Span]:
     """The places of the written text that differ; both neighbours of a place where something is missing."""
     old, new = _tokens(written), _tokens(meant)
     words, others = [w for w, _ in old], [w for w, _ in new]

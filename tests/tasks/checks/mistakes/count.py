@@ -17,7 +17,7 @@ from tests.tasks.checks.mistakes import (
     thirteenth,
     twelfth,
 )
-from tests.tasks.checks.test_mistakes_counted import mended, of_rules, of_tasks
+from tests.tasks.checks.test_mistakes_counted import fixed, rule_messages, task_messages
 
 BOTH = (tenth, eleventh, twelfth, thirteenth, fourteenth)
 """Sittings whose mistakes in both languages stand in one table."""
@@ -32,10 +32,10 @@ def mistakes() -> Iterator[tuple[str, Callable[[], bool]]]:
     """Each text with a mistake, and whether its hints mend it."""
     for table in (eighth_conditions, ninth_conditions, *BOTH):
         for text in (*map(rule, table.CONDITIONS), *table.WHOLE_RULES):
-            yield text, partial(mended, text, of_rules)
+            yield text, partial(fixed, text, rule_messages)
     for tasks in (eighth_tasks, ninth_tasks, *BOTH):
         for text in (*map(in_task, tasks.STAGES), *tasks.FILES):
-            yield text, partial(mended, text, of_tasks)
+            yield text, partial(fixed, text, task_messages)
 
 
 if __name__ == "__main__":

@@ -17,8 +17,8 @@ from typing import Any
 
 from tests.rules.language.test_mistakes import rule
 from tests.tasks.checks.mistakes import good_texts
-from tests.tasks.checks.mistakes.mutations import Slip, slips
-from tests.tasks.checks.test_mistakes_counted import fixes, of_rules, of_tasks
+from tests.tasks.checks.mistakes.mutations import Mutation, mutations
+from tests.tasks.checks.test_mistakes_counted import fixes, rule_messages, task_messages
 from visup.rules.language.parser import parse_rules
 from visup.tasks.checks.diagnose import diagnose
 
@@ -36,7 +36,7 @@ def good_rules() -> list[str]:
     texts = [shipped, *_blocks("docs/*.md")]
     found = [r for text in texts for r in _RULE.split(text)[1:]]
     found += [*map(rule, good_texts.CONDITIONS), *good_texts.RULES]
-    return [r for r in dict.fromkeys(f"{_bare(r)}\n" for r in found) if not of_rules(r)]
+    return [r for r in dict.fromkeys(f"{_bare(r)}\n" for r in found) if not rule_messages(r)]
 
 
 def good_tasks() -> list[str]:
@@ -45,7 +45,7 @@ def good_tasks() -> list[str]:
     texts = [f.read_text(encoding="utf-8") for f in sorted(files)]
     texts += [*_blocks("docs/*.md"), *_blocks("examples/tasks/*.md"), *good_texts.TASKS]
     some = [t for t in dict.fromkeys(texts) if "::=" in t and len(t) < LONGEST]
-    return [t for t in some if not of_tasks(t)]
+    return [t for t in some if not task_messages(t)]
 
 
 def _blocks(pattern: str) -> list[str]:
@@ -58,32 +58,32 @@ def _bare(rule: str) -> str:
 
 
 @dataclass(frozen=True)
-class Account:
+class HintOutcome:
     """What became of one mistake.
 
     Attributes:
-        slip: The mistake.
-        told: Whether each message has its place, and says what was expected or what to do.
+        mutation: The mistake.
+        complete: Whether each message has its place, and says what was expected or what to do.
         legal: Whether taking up the hints leads to a legal text.
         restored: Whether that text says what the good one said.
-        mended: The text to which the hints lead.
+        fixed_text: The text to which the hints lead.
     """
 
-    slip: Slip
-    told: bool
+    mutation: Mutation
+    complete: bool
     legal: bool
     restored: bool
-    mended: str
+    fixed_text: str
 
 
-def account_of(slip: Slip, of_task: bool) -> Account | None:
+def outcome_of(mutation: Mutation, of_task: bool) -> HintOutcome | None:
     """What becomes of a mistake; None if the text is legal all the same."""
-    read = of_tasks if of_task else of_rules
-    found = read(slip.text)
+    read = task_messages if of_task else rule_messages
+    found = read(mutation.text)
     if not found:
         return None
-    told = all("^" in t.text and (t.expected or t.hint) for t in found)
-    text = slip.text
+    complete = all("^" in t.text and (t.expected or t.hint) for t in found)
+    text = mutation.text
     for _ in range(MOST_FIXES):
         fix = next(fixes(text, found), None)
         if fix is None:
@@ -93,8 +93,8 @@ def account_of(slip: Slip, of_task: bool) -> Account | None:
         if not found:
             break
     legal = not found
-    restored = legal and meaning(text, of_task) == meaning(slip.good, of_task)
-    return Account(slip, bool(told), legal, restored, text)
+    restored = legal and meaning(text, of_task) == meaning(mutation.good, of_task)
+    return HintOutcome(mutation, bool(complete), legal, restored, text)
 
 
 @lru_cache(maxsize=4096)
@@ -103,24 +103,26 @@ def meaning(text: str, of_task: bool) -> Any:
     return diagnose(text, "my.task")[0] if of_task else parse_rules(text, "my.rules")
 
 
-def accounts(of_each: int, seed: int, every: int) -> Iterator[tuple[bool, Account]]:
+def accounts(of_each: int, seed: int, every: int) -> Iterator[tuple[bool, HintOutcome]]:
     """The accounts of the mistakes made from each `every`th good text."""
     chance = Random(seed)
     for of_task, texts in ((False, good_rules()), (True, good_tasks())):
         for good in texts[seed % every :: every]:
-            for slip in slips(good, chance, of_each):
-                found = account_of(slip, of_task)
+            for mutation in mutations(good, chance, of_each):
+                found = outcome_of(mutation, of_task)
                 if found is not None:
                     yield of_task, found
 
 
-def table(found: Sequence[tuple[bool, Account]]) -> str:
+def table(found: Sequence[tuple[bool, HintOutcome]]) -> str:
     """Counts by language and kind: mistakes, told, mended, what was meant."""
     rows: dict[tuple[bool, str], Counter[str]] = {}
     for of_task, one in found:
-        for kind in (one.slip.kind, "all"):
+        for kind in (one.mutation.kind, "all"):
             row = rows.setdefault((of_task, kind), Counter())
-            row.update(n=1, told=one.told, legal=one.told and one.legal, same=one.restored)
+            row.update(
+                n=1, complete=one.complete, legal=one.complete and one.legal, same=one.restored
+            )
     lines = [f"{'':24}{'mistakes':>9}{'told':>7}{'mended':>8}{'as meant':>10}"]
     for (of_task, kind), row in sorted(rows.items()):
         name = f"{'tasks' if of_task else 'rules'}: {kind}"
@@ -142,18 +144,18 @@ def main() -> None:
     options = parser.parse_args()
     found = list(accounts(options.of_each, options.seed, options.every))
     for of_task, one in found:
-        missed = options.missed and not (one.told and one.legal)
+        missed = options.missed and not (one.complete and one.legal)
         if missed or (options.other and one.legal and not one.restored):
-            show(of_task, one)
+            print_outcome(of_task, one)
     print(table(found))
 
 
-def show(of_task: bool, one: Account) -> None:
+def print_outcome(of_task: bool, one: HintOutcome) -> None:
     """Print the lines that a mistake and its hints have changed, and what was said of it."""
-    told = of_tasks(one.slip.text) if of_task else of_rules(one.slip.text)
-    print("=====", "task" if of_task else "rule", one.slip.kind)
-    before, after = one.slip.good.split("\n"), one.mended.split("\n")
-    slipped = one.slip.text.split("\n")
+    told = task_messages(one.mutation.text) if of_task else rule_messages(one.mutation.text)
+    print("=====", "task" if of_task else "rule", one.mutation.kind)
+    before, after = one.mutation.good.split("\n"), one.fixed_text.split("\n")
+    slipped = one.mutation.text.split("\n")
     for sign, rows, others in (("good ", before, slipped), ("wrong", slipped, before)):
         print(*(f"{sign} {row}" for row in rows if row not in others), sep="\n")
     print(*(f"fixed {row}" for row in after if row not in slipped), sep="\n")

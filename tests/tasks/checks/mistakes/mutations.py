@@ -97,7 +97,7 @@ class Token:
 
 
 @dataclass(frozen=True, slots=True)
-class Slip:
+class Mutation:
     """A text with one mistake.
 
     Attributes:
@@ -122,7 +122,7 @@ def tokens_of(text: str) -> list[Token]:
     return [Token(m.start(), m[0]) for m in TOKEN.finditer(text) if m[0][0] != "#"]
 
 
-def slips(good: str, chance: Random, of_each: int = 1) -> Iterator[Slip]:
+def mutations(good: str, chance: Random, of_each: int = 1) -> Iterator[Mutation]:
     """Mistaken forms of a good text: of each kind as many as asked for, where there is a place for it."""
     tokens = tokens_of(good)
     for kind, edits_at in KINDS.items():
@@ -130,7 +130,7 @@ def slips(good: str, chance: Random, of_each: int = 1) -> Iterator[Slip]:
         for begin, end, new in chance.sample(found, min(of_each, len(found))):
             text = good[:begin] + new + good[end:]
             if text.split() != good.split():
-                yield Slip(kind, good, text, begin)
+                yield Mutation(kind, good, text, begin)
 
 
 def _left_out(tokens: Sequence[Token], n: int, _: Random) -> Iterator[Edit]:

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from tests.tasks.checks.mistakes.carets import points_at_culprit
-from tests.tasks.checks.mistakes.counted import Account, account_of, show, table
-from tests.tasks.checks.mistakes.mutations import Slip
-from tests.tasks.checks.test_mistakes_counted import Told, of_rules, of_tasks
+from tests.tasks.checks.mistakes.counted import HintOutcome, outcome_of, print_outcome, table
+from tests.tasks.checks.mistakes.mutations import Mutation
+from tests.tasks.checks.test_mistakes_counted import Message, rule_messages, task_messages
 
 FOLDER = Path(__file__).parent / "newcomers"
 SETS = ("fifteenth", "sixteenth", "seventeenth", "eighteenth", "nineteenth", "twentieth")
@@ -23,18 +23,18 @@ _PAIR = re.compile(r"\[\[(.*?)~>(.*?)\]\](?!\])", re.DOTALL)
 _BETWEEN = re.compile(r"^====\n", re.MULTILINE)
 
 
-def pairs(name: str, of_task: bool) -> Iterator[Slip]:
+def pairs(name: str, of_task: bool) -> Iterator[Mutation]:
     """The files of a set in one of the two languages, with their mistakes."""
     file = FOLDER / f"{name}_{'tasks' if of_task else 'rules'}.txt"
     for written in _BETWEEN.split(file.read_text(encoding="utf-8")):
-        yield Slip(name, _PAIR.sub(r"\2", written), _PAIR.sub(r"\1", written), 0)
+        yield Mutation(name, _PAIR.sub(r"\2", written), _PAIR.sub(r"\1", written), 0)
 
 
-def accounts(name: str) -> Iterator[tuple[bool, Slip, Account | None]]:
+def accounts(name: str) -> Iterator[tuple[bool, Mutation, HintOutcome | None]]:
     """What becomes of each mistake of a set; None of those that are legal."""
     for of_task in (False, True):
-        for slip in pairs(name, of_task):
-            yield of_task, slip, account_of(slip, of_task)
+        for mutation in pairs(name, of_task):
+            yield of_task, mutation, outcome_of(mutation, of_task)
 
 
 class Pointing(NamedTuple):
@@ -42,15 +42,15 @@ class Pointing(NamedTuple):
 
     Attributes:
         of_task: Whether it is one of a task file.
-        slip: The mistake.
-        told: Its messages.
+        mutation: The mistake.
+        complete: Its messages.
         any: Whether one of them points at the culprit.
         first: Whether the first of them does.
     """
 
     of_task: bool
-    slip: Slip
-    told: list[Told]
+    mutation: Mutation
+    complete: list[Message]
     any: bool
     first: bool
 
@@ -58,22 +58,22 @@ class Pointing(NamedTuple):
 def pointings(name: str) -> Iterator[Pointing]:
     """What the messages of each mistake of a set point at; nothing for those that are legal."""
     for of_task in (False, True):
-        for slip in pairs(name, of_task):
-            told = of_tasks(slip.text) if of_task else of_rules(slip.text)
+        for mutation in pairs(name, of_task):
+            told = task_messages(mutation.text) if of_task else rule_messages(mutation.text)
             if told:
-                at = [points_at_culprit(t.place, slip.text, slip.good) for t in told]
-                yield Pointing(of_task, slip, told, any(at), at[0])
+                at = [points_at_culprit(t.place, mutation.text, mutation.good) for t in told]
+                yield Pointing(of_task, mutation, told, any(at), at[0])
 
 
 def carets(names: Sequence[str], show_beside: bool) -> str:
     """How many mistakes are pointed at, by set and in all; those that are not are printed if wanted."""
     found = [one for name in names for one in pointings(name)]
     for one in (one for one in found if show_beside and not one.any):
-        print("===== beside the culprit", one.slip.kind, "meant:", one.slip.good, sep="\n")
-        print(*(told.text for told in one.told), sep="\n")
+        print("===== beside the culprit", one.mutation.kind, "meant:", one.mutation.good, sep="\n")
+        print(*(told.text for told in one.complete), sep="\n")
     lines = [f"{'':24}{'mistakes':>9}{'caret':>7}{'caret of the first message':>28}"]
     for name in (*names, "all"):
-        some = [one for one in found if name in (one.slip.kind, "all")]
+        some = [one for one in found if name in (one.mutation.kind, "all")]
         at, first = sum(one.any for one in some), sum(one.first for one in some)
         lines.append(f"{name:24}{len(some):9}{at:7}{first:28}  {100 * at / len(some):.0f} %")
     return "\n".join(lines)
@@ -88,13 +88,13 @@ def main() -> None:
     parser.add_argument("--beside", action="store_true")
     options = parser.parse_args()
     found = [one for name in options.names for one in accounts(name)]
-    for of_task, slip, one in found:
+    for of_task, mutation, one in found:
         if one is None:
-            print("===== legal", slip.text, sep="\n")
-        elif (options.missed and not (one.told and one.legal)) or (
+            print("===== legal", mutation.text, sep="\n")
+        elif (options.missed and not (one.complete and one.legal)) or (
             options.other and one.legal and not one.restored
         ):
-            show(of_task, one)
+            print_outcome(of_task, one)
     print(table([(of_task, one) for of_task, _, one in found if one is not None]))
     print(carets(options.names, options.beside))
 
