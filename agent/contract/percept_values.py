@@ -25,41 +25,41 @@ LARGEST_SIDE = 2**16
 """Largest width or height of a frame, pixels."""
 
 
-def check_value(kind: str, value: Any, size: tuple[int, int], who: str) -> None:
+def check_value(kind: str, value: Any, size: tuple[int, int], subject: str) -> None:
     """Check the value of a percept.
 
     Args:
         kind: Kind of percept.
         value: Its value.
         size: Width and height of the frame, pixels.
-        who: Name of the behaviour, for the message.
+        subject: Name of the behaviour, for the message.
 
     Raises:
         BehaviourError: It is not valid.
     """
     check = VALUE_CHECKS.get(kind)
     if check is None:
-        _check_plain(value, who)
+        _check_plain(value, subject)
         return
     kind_type, check_of_kind = check
     expect(
         isinstance(value, kind_type),
-        f"{who} as {type_with_article(value)}",
+        f"{subject} as {type_with_article(value)}",
         _with_article(kind_type),
     )
     check_of_kind(value, size)
 
 
 def _region(r: Region, size: tuple[int, int]) -> None:
-    who = f"region {brief(r.id)}"
+    subject = f"region {brief(r.id)}"
     expect(
         isinstance(r.id, int) and _is_integer(r.id) and r.id >= 1,
-        f"{who} has no number",
+        f"{subject} has no number",
         "an id from 1",
     )
     expect(
         isinstance(r.bbox, tuple) and len(r.bbox) == 4 and all(_is_integer(v) for v in r.bbox),
-        f"{who} has box {brief(r.bbox)}",
+        f"{subject} has box {brief(r.bbox)}",
         "(x, y, width, height) in whole pixels",
     )
     x, y, w, h = r.bbox
@@ -67,45 +67,53 @@ def _region(r: Region, size: tuple[int, int]) -> None:
     shape = getattr(r.mask, "shape", None)
     expect(
         inside and shape == (h, w),
-        f"{who} has box {r.bbox} and a mask of {brief(shape)}",
+        f"{subject} has box {r.bbox} and a mask of {brief(shape)}",
         f"a box within {size} and a mask of (height, width) of the box",
     )
-    expect(r.mask.dtype == np.bool_, f"{who} has a mask of {r.mask.dtype}", "a mask of bool")
-    expect(bool(r.mask.any()), f"{who} has an empty mask", "at least one pixel")
-    _array(r.contour, f"{who}: contour", (None, 2))
+    expect(r.mask.dtype == np.bool_, f"{subject} has a mask of {r.mask.dtype}", "a mask of bool")
+    expect(bool(r.mask.any()), f"{subject} has an empty mask", "at least one pixel")
+    _array(r.contour, f"{subject}: contour", (None, 2))
     if r.motion is not None:
-        _array(r.motion, f"{who}: motion", (2, 3))
+        _array(r.motion, f"{subject}: motion", (2, 3))
     for name, value in (("centroid", r.centroid), ("velocity", r.velocity)):
         pair = isinstance(value, tuple) and len(value) == 2 and all(is_finite(v) for v in value)
-        expect(pair, f"{who} has {name} {brief(value)}", "(x, y), two finite numbers")
+        expect(pair, f"{subject} has {name} {brief(value)}", "(x, y), two finite numbers")
     for name, number in (("area", r.area), ("velocity_sigma", r.velocity_sigma)):
         expect(
-            _is_at_least(number, 0.0), f"{who} has {name} {brief(number)}", "a number, at least 0"
+            _is_at_least(number, 0.0),
+            f"{subject} has {name} {brief(number)}",
+            "a number, at least 0",
         )
-    expect(_is_share(r.confidence), f"{who} has confidence {brief(r.confidence)}", "0 to 1")
+    expect(_is_share(r.confidence), f"{subject} has confidence {brief(r.confidence)}", "0 to 1")
 
 
 def _hypothesis(h: Hypothesis, size: tuple[int, int]) -> None:
-    who = f"hypothesis of region {brief(h.region_id)}"
-    expect(_is_integer(h.region_id), f"{who} has no region", "the id of a region of this frame")
-    expect(isinstance(h.name, str) and bool(h.name), f"{who} has no name", "the name of a model")
-    expect(_is_integer(h.view), f"{who} has view {brief(h.view)}", "the number of a view")
-    expect(_is_share(h.similarity), f"{who} has similarity {brief(h.similarity)}", "0 to 1")
+    subject = f"hypothesis of region {brief(h.region_id)}"
+    expect(_is_integer(h.region_id), f"{subject} has no region", "the id of a region of this frame")
+    expect(
+        isinstance(h.name, str) and bool(h.name), f"{subject} has no name", "the name of a model"
+    )
+    expect(_is_integer(h.view), f"{subject} has view {brief(h.view)}", "the number of a view")
+    expect(_is_share(h.similarity), f"{subject} has similarity {brief(h.similarity)}", "0 to 1")
     for name, value in (("rotation", h.rotation), ("scale", h.scale)):
         valid = value is None or is_finite(value)
-        expect(valid, f"{who} has {name} {brief(value)}", "a finite number, or None")
-    expect(isinstance(h.of_kind, bool), f"{who} has of_kind {brief(h.of_kind)}", "true or false")
+        expect(valid, f"{subject} has {name} {brief(value)}", "a finite number, or None")
+    expect(
+        isinstance(h.of_kind, bool), f"{subject} has of_kind {brief(h.of_kind)}", "true or false"
+    )
     if h.direction is not None:
-        _array(h.direction, f"{who}: direction", (3,))
+        _array(h.direction, f"{subject}: direction", (3,))
 
 
 def _depth(d: Depth, size: tuple[int, int]) -> None:
-    who = f"depth of region {brief(d.region_id)}"
-    expect(_is_integer(d.region_id), f"{who} has no region", "the id of a region of this frame")
-    expect(isinstance(d.name, str), f"{who} has name {brief(d.name)}", "the name of a model")
+    subject = f"depth of region {brief(d.region_id)}"
+    expect(_is_integer(d.region_id), f"{subject} has no region", "the id of a region of this frame")
+    expect(isinstance(d.name, str), f"{subject} has name {brief(d.name)}", "the name of a model")
     positive = is_finite(d.depth) and d.depth > 0
-    expect(positive, f"{who} is {brief(d.depth)}", "a finite number above 0")
-    expect(_is_at_least(d.sigma, 0.0), f"{who} has sigma {brief(d.sigma)}", "a number, at least 0")
+    expect(positive, f"{subject} is {brief(d.depth)}", "a finite number above 0")
+    expect(
+        _is_at_least(d.sigma, 0.0), f"{subject} has sigma {brief(d.sigma)}", "a number, at least 0"
+    )
 
 
 def _camera(c: CameraMotion, size: tuple[int, int]) -> None:
@@ -131,28 +139,28 @@ VALUE_CHECKS: Mapping[str, tuple[type, Callable[[Any, tuple[int, int]], None]]] 
 """Kind -> type of its values, and their check."""
 
 
-def _check_plain(value: object, who: str, depth: int = 0) -> None:
+def _check_plain(value: object, subject: str, depth: int = 0) -> None:
     """Check a value of a plug-in's own kind: plain data with finite numbers; missing values are None."""
-    expect(depth <= DEEPEST, f"{who} nested too deep", f"at most {DEEPEST} levels")
+    expect(depth <= DEEPEST, f"{subject} nested too deep", f"at most {DEEPEST} levels")
     if isinstance(value, int) and not isinstance(value, Enum):
         expect(
             value.bit_length() <= MOST_BITS,
-            f"{who} with a number of {value.bit_length()} bits",
+            f"{subject} with a number of {value.bit_length()} bits",
             f"at most {MOST_BITS}",
         )
         return
     if value is None or isinstance(value, str | bytes | Enum | np.integer | np.bool_):
         return
     if isinstance(value, float | np.floating):
-        expect(bool(np.isfinite(value)), f"{who} as {value}", "a finite number, or None")
+        expect(bool(np.isfinite(value)), f"{subject} as {value}", "a finite number, or None")
     elif isinstance(value, np.ndarray):
-        _check_plain_array(value, who)
+        _check_plain_array(value, subject)
     else:
-        for part in _parts(value, who):
-            _check_plain(part, who, depth + 1)
+        for part in _parts(value, subject):
+            _check_plain(part, subject, depth + 1)
 
 
-def _parts(value: object, who: str) -> Iterable[object]:
+def _parts(value: object, subject: str) -> Iterable[object]:
     if isinstance(value, Mapping):
         return (*value.keys(), *value.values())
     if isinstance(value, tuple | list | set | frozenset):
@@ -160,24 +168,26 @@ def _parts(value: object, who: str) -> Iterable[object]:
     if is_dataclass(value) and not isinstance(value, type):
         return [getattr(value, f.name) for f in fields(value)]
     raise BehaviourError(
-        f"{who} with {type_with_article(value)} in it",
+        f"{subject} with {type_with_article(value)} in it",
         expected="numbers, text, arrays, and lists, dicts or dataclasses of these",
     )
 
 
-def _check_plain_array(value: NDArray[Any], who: str) -> None:
-    expect(value.dtype.kind in "biufSU", f"{who} as an array of {value.dtype}", "numbers or text")
+def _check_plain_array(value: NDArray[Any], subject: str) -> None:
+    expect(
+        value.dtype.kind in "biufSU", f"{subject} as an array of {value.dtype}", "numbers or text"
+    )
     if value.dtype.kind == "f":
         # The masked elements of a masked array are missing values.
         known = value.compressed() if isinstance(value, np.ma.MaskedArray) else value
         expect(
             bool(np.isfinite(known).all()),
-            f"{who} with numbers that are not finite",
+            f"{subject} with numbers that are not finite",
             "finite numbers; mask what was not measured with numpy.ma",
         )
 
 
-def _array(value: Any, who: str, shape: tuple[int | None, ...]) -> None:
+def _array(value: Any, subject: str, shape: tuple[int | None, ...]) -> None:
     try:
         found = np.asarray(value)
     except ValueError:
@@ -186,9 +196,9 @@ def _array(value: Any, who: str, shape: tuple[int | None, ...]) -> None:
         side in (None, found_side) for side, found_side in zip(shape, found.shape, strict=True)
     )
     expected_shape = ", ".join("N" if n is None else str(n) for n in shape)
-    expect(matches, f"{who} has shape {found.shape}", f"({expected_shape})")
+    expect(matches, f"{subject} has shape {found.shape}", f"({expected_shape})")
     numbers = found.dtype.kind in "iuf" and bool(np.isfinite(found).all())
-    expect(numbers, f"{who} contains a number that is not finite", "finite numbers")
+    expect(numbers, f"{subject} contains a number that is not finite", "finite numbers")
 
 
 def expect(condition: bool, what: str, expected: str) -> None:

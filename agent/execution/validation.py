@@ -65,26 +65,26 @@ def check_percepts(
     """
     region_ids: set[int] = {r.id for r in before.of("region")} if before is not None else set()
     for p in percepts:
-        who = f"behaviour '{contract.name}' reported '{brief(p.kind)}'"
+        subject = f"behaviour '{contract.name}' reported '{brief(p.kind)}'"
         if not isinstance(p.kind, str) or p.kind not in contract.gives:
             expected = f"one of its contract's kinds: {', '.join(contract.gives)}"
-            raise BehaviourError(who, expected=expected)
+            raise BehaviourError(subject, expected=expected)
         expect(
             is_finite(p.time) and abs(p.time - frame.time) <= SAME_TIME_S,
-            f"{who} with time {brief(p.time)}",
+            f"{subject} with time {brief(p.time)}",
             f"the frame's time, {frame.time:g} s",
         )
         expect(
             p.source == contract.name,
-            f"{who} with source {brief(p.source)}",
+            f"{subject} with source {brief(p.source)}",
             f"its own name, '{contract.name}'",
         )
         expect(
             is_finite(p.confidence) and 0.0 <= p.confidence <= 1.0,
-            f"{who} with confidence {brief(p.confidence)}",
+            f"{subject} with confidence {brief(p.confidence)}",
             "a number from 0 to 1",
         )
-        check_value(p.kind, p.value, frame.size, who)
+        check_value(p.kind, p.value, frame.size, subject)
         if isinstance(p.value, Region):
             expect(
                 p.value.id not in region_ids,

@@ -91,8 +91,8 @@ def _answer(channel: Channel, work: Callable[[], tuple[Message, Any]]) -> Any:
 def _contracts(request: Message) -> tuple[Message, None]:
     """The contracts of a file or module, whose behaviours are created with their settings."""
     limit_at_start(0.0)
-    made = load_behaviours(request["where"], request["settings"])
-    return {"contracts": [contract_document(b.contract) for b in made]}, None
+    behaviours = load_behaviours(request["where"], request["settings"])
+    return {"contracts": [contract_document(b.contract) for b in behaviours]}, None
 
 
 def _start_requested(request: Message) -> tuple[Message, Behaviour]:
@@ -105,9 +105,9 @@ def _start_requested(request: Message) -> tuple[Message, Behaviour]:
 
 def _loaded(request: Message) -> Behaviour:
     """The behaviour of a name in a file or module."""
-    for made in load_behaviours(request["where"], request["settings"]):
-        if made.contract.name == request["name"]:
-            return made
+    for behaviour in load_behaviours(request["where"], request["settings"]):
+        if behaviour.contract.name == request["name"]:
+            return behaviour
     raise BehaviourError(
         f"there is no behaviour called '{request['name']}'", where=request["where"]
     )
@@ -121,12 +121,14 @@ def _recreated(request: Message) -> Behaviour:
     kind: Any = import_file(Path(file)) if file else importlib.import_module(request["module"])
     for part in request["object"].split("."):
         kind = getattr(kind, part)
-    made = object.__new__(kind)
+    behaviour = object.__new__(kind)
     for name, value in load_state(base64.b64decode(request["attributes"])).items():
-        object.__setattr__(made, name, value)
+        object.__setattr__(behaviour, name, value)
     if request["own_settings"] is not None:
-        object.__setattr__(made, "settings", kind.Settings.model_validate(request["own_settings"]))
-    return as_behaviour(made, request["object"])
+        object.__setattr__(
+            behaviour, "settings", kind.Settings.model_validate(request["own_settings"])
+        )
+    return as_behaviour(behaviour, request["object"])
 
 
 def _run(

@@ -64,7 +64,7 @@ def close_matches(word: str, known: Iterable[str], n: int = 3, cutoff: float = 0
 
 _ROUNDING = 1e-9
 _LONG = 64
-"""Characters of a word from which on its letters are not kept."""
+"""Length from which the letters of a word are not cached, characters."""
 
 
 def _letters(word: str) -> frozenset[tuple[str, int]]:

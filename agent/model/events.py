@@ -48,7 +48,7 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class AlertCondition:
-    """A reason for an alert that holds now; the act phase keeps alerts from these.
+    """A reason for an alert that currently holds; the act phase opens and closes alerts accordingly.
 
     Attributes:
         kind: 'collision_course', 'unexpected_object', 'stage_failing', ...
@@ -56,7 +56,7 @@ class AlertCondition:
         severity: How grave it is.
         cause: The sentence for the narrative, with full stop.
         evidence: Facts that led to it, one sentence each.
-        key: What tells two conditions of one kind and the same objects apart (such as a stage).
+        key: Distinguishes conditions of one kind and the same objects (such as a stage).
         needs: Kinds of percept without which it is unknown whether it is over.
     """
 

@@ -27,8 +27,8 @@ class Candidate:
         name: Model name.
         votes: Time-discounted votes (paper, section 5).
         share: Share of all votes for the object, 0 to 1.
-        confidence: How likely it is the right one, 0 to 1; what is left over those of all candidates
-            is how likely the object is none of the models known.
+        confidence: Probability that it is the right one, 0 to 1; those of all candidates and that of none of
+            the known models sum to 1.
     """
 
     name: str

@@ -108,11 +108,11 @@ class RelationBlock:
         at = column.rows[row]
         state = int(self.state[at, k])
         unknown = state == UNKNOWN_CODE
-        held = Truth.TRUE if state == code else Truth.FALSE
+        known_truth = Truth.TRUE if state == code else Truth.FALSE
         return Relation(
             column.names[code],
             pair,
-            Truth.UNKNOWN if unknown else held,
+            Truth.UNKNOWN if unknown else known_truth,
             float(self.since[at, k]),
             0.0 if unknown else float(self.numbers[column.confidence, k]),
             self._number(column.value, k),

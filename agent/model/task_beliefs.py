@@ -41,7 +41,7 @@ class Binding:
         models: Model names that the actor may be.
         object_id: The object believed to play it, or None when none does.
         strength: Strength of that belief, 0 to 1.
-        guessed: Whether nothing but that nobody else is left speaks for the object.
+        guessed: Whether the only evidence is that no other object is left for the actor.
     """
 
     actor: str
@@ -87,8 +87,7 @@ class StageBelief:
         since: Seconds since when it has this status.
         confidence: 0 to 1.
         evidence: One sentence: why.
-        begun: Whether anything of it was seen since it was last pending; the first stage begins with the
-            task.
+        begun: Whether it has been observed since it was last pending; the first stage begins with the task.
     """
 
     stage: str
@@ -109,16 +108,16 @@ class TaskBelief:
         stages: In the order of the task.
         current: Name of the stage that is under way, or None.
         bindings: Which object plays which actor.
-        expected: What the current stage asks for.
+        expected: Relations that the current stage requires.
         unexplained: Ids of objects that no actor of the task explains.
-        bystanders: Ids of objects that the task lets be.
-        machines: Ids of objects that are one machine, for each machine of which parts are found.
+        bystanders: Ids of objects that the task ignores.
+        machines: For each machine of which parts are found, the ids of these parts.
         confidence: 0 to 1.
         evidence: One sentence: why the verdict is what it is.
-        prospects: What may come next, a stage or the end, the likeliest first; what is left of 1
-            is for a failure before that.
-        success: Probability that the task still ends well, or None while nothing is followed.
-        active: How likely it is that the task is going on at all; 1 when it is the only one given.
+        prospects: Stages that may come next, or the end, likeliest first; their probabilities and that of
+            a failure before sum to 1.
+        success: Probability that the task will succeed, or None while it is not followed.
+        active: Probability that the task is in progress at all; 1 if it is the only one given.
     """
 
     task: str

@@ -62,7 +62,7 @@ class BehaviourFactory:
         name = self.contract.name if self.contract else getattr(self.kind, "__name__", "behaviour")
         given = validate_settings(self.settings, settings or {}, name)
         try:
-            made = self.kind() if given is None else self.kind(given)
+            behaviour = self.kind() if given is None else self.kind(given)
         except BehaviourError:
             raise
         except Exception as fault:
@@ -73,7 +73,7 @@ class BehaviourFactory:
                 where=self.where,
                 expected=f"a class that is made with {takes}",
             ) from fault
-        return as_behaviour(made, self.where)
+        return as_behaviour(behaviour, self.where)
 
 
 def load_behaviours(
@@ -115,37 +115,37 @@ def find_factories(where: str) -> list[BehaviourFactory]:
     return [BehaviourFactory(getattr(module, name), where)]
 
 
-def as_behaviour(made: object, where: str) -> Behaviour:
+def as_behaviour(behaviour: object, where: str) -> Behaviour:
     """The same object, checked to be a behaviour.
 
     Raises:
         BehaviourError: It has no contract, or no `perceive` with the required signature.
     """
-    if not isinstance(getattr(made, "contract", None), Contract):
+    if not isinstance(getattr(behaviour, "contract", None), Contract):
         raise BehaviourError(
-            f"{type(made).__name__} has no contract",
+            f"{type(behaviour).__name__} has no contract",
             where=where,
             expected="an attribute `contract = Contract(name, gives=(...))`",
         )
-    perceive = getattr(made, "perceive", None)
+    perceive = getattr(behaviour, "perceive", None)
     expected = "perceive(self, frame, observation, directives) -> percepts"
     if not callable(perceive):
         raise BehaviourError(
-            f"{type(made).__name__} has no method `perceive`", where=where, expected=expected
+            f"{type(behaviour).__name__} has no method `perceive`", where=where, expected=expected
         )
     if inspect.iscoroutinefunction(perceive) or inspect.isasyncgenfunction(perceive):
         raise BehaviourError(
-            f"{type(made).__name__}.perceive is asynchronous", where=where, expected=expected
+            f"{type(behaviour).__name__}.perceive is asynchronous", where=where, expected=expected
         )
     try:
         inspect.signature(perceive).bind(None, None, None)
     except TypeError as fault:
         raise BehaviourError(
-            f"{type(made).__name__}.perceive cannot be called: {fault}",
+            f"{type(behaviour).__name__}.perceive cannot be called: {fault}",
             where=where,
             expected=expected,
         ) from fault
-    return made  # type: ignore[return-value]  # checked above, member by member
+    return behaviour  # type: ignore[return-value]  # checked above, member by member
 
 
 def module_name(path: Path) -> str:

@@ -4,7 +4,7 @@ Read `journal.py` (written step by step, SQLite) and `journal_reader.py` (read b
 `mask_codec.py` packs observations to the last bit, `jsonable.py` gives records as plain JSON,
 `checkpoint.py` saves the state of an agent.
 
-Names are loaded when they are first used: the process of an isolated behaviour packs, and keeps no journal.
+Names are loaded on first use: the process of an isolated behaviour encodes, but writes no journal.
 """
 
 from typing import TYPE_CHECKING

@@ -55,9 +55,9 @@ def own_key() -> bytes:
         finally:
             draft.unlink()
     except (OSError, RuntimeError) as fault:  # RuntimeError: unknown home folder
-        why = fault.strerror if isinstance(fault, OSError) else fault
+        reason = fault.strerror if isinstance(fault, OSError) else fault
         raise SealError(
-            f"no key can be kept at {path}: {why}; {KEY_FILE} names another file"
+            f"no key can be kept at {path}: {reason}; {KEY_FILE} names another file"
         ) from fault
     return _read()
 

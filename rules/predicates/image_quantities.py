@@ -38,8 +38,8 @@ def height(facts: Snapshot) -> Floats:
 
 def area_share(facts: Snapshot) -> Floats:
     """The share of the image that each object covers."""
-    whole = float(np.prod(facts.mind.frame_size)) or 1.0
-    return _seen(facts, [b.region.area / whole for b in facts.beliefs])
+    image_area = float(np.prod(facts.mind.frame_size)) or 1.0
+    return _seen(facts, [b.region.area / image_area for b in facts.beliefs])
 
 
 def depth(facts: Snapshot) -> Floats:
@@ -90,11 +90,11 @@ def centre_distance(facts: Snapshot) -> Floats:
     """Distance between the centres of all pairs, pixels; unknown if one is out of view."""
     x, y = horizontal_position(facts), vertical_position(facts)
     known = np.isfinite(x[0])
-    apart = np.hypot(
+    distance = np.hypot(
         np.where(known, x[0], 0.0)[:, None] - np.where(known, x[0], 0.0)[None],
         np.where(known, y[0], 0.0)[:, None] - np.where(known, y[0], 0.0)[None],
     )
-    return _of_known_pairs(apart, known)
+    return _of_known_pairs(distance, known)
 
 
 def box_overlap(facts: Snapshot) -> Floats:

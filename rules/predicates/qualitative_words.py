@@ -90,19 +90,19 @@ def tpcc_codes(facts: Snapshot, relation: str) -> Codes:
     centres = np.array([b.region.centroid for b in facts.beliefs], dtype=float).reshape(-1, 2)
     centres[~_seen(facts)] = np.nan
     ahead = centres[None, :] - centres[:, None]  # from a to b
-    there = centres[None, None, :] - centres[None, :, None]  # from b to c
-    straight, far = ahead[:, :, None], np.linalg.norm(there, axis=3)
-    cross = straight[..., 0] * there[..., 1] - straight[..., 1] * there[..., 0]
-    dot = (straight * there).sum(axis=3)
+    to_third = centres[None, None, :] - centres[None, :, None]  # from b to c
+    direction, distance = ahead[:, :, None], np.linalg.norm(to_third, axis=3)
+    cross = direction[..., 0] * to_third[..., 1] - direction[..., 1] * to_third[..., 0]
+    dot = (direction * to_third).sum(axis=3)
     # Positive to the left, since y points down in images.
-    turn = np.degrees(np.arctan2(-cross, dot))
+    angle = np.degrees(np.arctan2(-cross, dot))
     level = LEVEL_TOLERANCE * image_diagonal(facts.mind.frame_size)
-    same = far <= level
+    coincides = distance <= level
     if relation == "sam":
-        return _codes(same, np.isnan(far))
-    near = far < np.linalg.norm(ahead, axis=2)[:, :, None]
-    holds = _in_sector(turn, relation[1:]) & (near == (relation[0] == "c")) & ~same
-    return _codes(holds, np.isnan(turn + far))
+        return _codes(coincides, np.isnan(distance))
+    is_close = distance < np.linalg.norm(ahead, axis=2)[:, :, None]
+    holds = _in_sector(angle, relation[1:]) & (is_close == (relation[0] == "c")) & ~coincides
+    return _codes(holds, np.isnan(angle + distance))
 
 
 _STRAIGHT = {"sf": 0.0, "sl": 90.0, "sb": 180.0, "sr": -90.0}

@@ -79,9 +79,9 @@ class Snapshot:
 
     def unknown(self, objects: int) -> Floats:
         """(2, n) or (2, n, n) intervals, all unknown."""
-        whole = np.empty((2, *(len(self.ids),) * objects))
-        whole[0], whole[1] = -np.inf, np.inf
-        return whole
+        intervals = np.empty((2, *(len(self.ids),) * objects))
+        intervals[0], intervals[1] = -np.inf, np.inf
+        return intervals
 
     def relation_codes(self, name: str) -> Codes:
         """(n, n) codes of a relation, a the row and b the column."""
@@ -133,8 +133,8 @@ class Snapshot:
 
     def pair_intervals(self, quantity: int) -> Floats:
         """(2, n, n) intervals of one of the quantities of `pair_loops`."""
-        whole: Floats = self._pairs[0][quantity]
-        return whole
+        intervals: Floats = self._pairs[0][quantity]
+        return intervals
 
     @property
     def first_contact(self) -> Codes:

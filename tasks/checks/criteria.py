@@ -26,9 +26,9 @@ CONTRARY_RANKS = ({"largest", "smallest"}, {"leftmost", "rightmost"}, {"highest"
 def criteria_faults(task: Task, source: Source) -> Iterator[Diagnostic]:
     """One fault for each actor with unsatisfiable criteria, or that is a part of itself."""
     for actor in (*task.actors, *task.bystanders):
-        why = _contradiction(task, actor)
-        if why:
-            what = f"no object can be actor `{actor.name}`: {why}"
+        reason = _contradiction(task, actor)
+        if reason:
+            what = f"no object can be actor `{actor.name}`: {reason}"
             expected = "criteria that one object can meet; models and colours are separated by `or`"
             yield source.fault("E236", what, actor.span, expected)
         if actor.machine == actor.name or _circular(task, actor):

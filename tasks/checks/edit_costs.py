@@ -211,9 +211,11 @@ class _Replacements:
         """See `EditCosts.replacements`."""
         texts = [w.text for w in words[at : at + LONGEST]]
         found = [
-            Replacement(length, (terminal,), meant, cost)
-            for length, meant, cost in self.meanings(texts[:LONGEST_NAME], at == 0)
-            for terminal in (("NAME",) if meant.endswith("_1") else _kinds(meant))
+            Replacement(length, (terminal,), replacement, cost)
+            for length, replacement, cost in self.meanings(texts[:LONGEST_NAME], at == 0)
+            for terminal in (
+                ("NAME",) if replacement.endswith("_1") else _terminals_for(replacement)
+            )
         ]
         for length, call in sentences(texts, self.names, _action_with_actors):
             found.append(
@@ -236,10 +238,10 @@ class _Replacements:
         """(Number of words, meaning, cost) of the first words."""
         word, is_call = words[0], len(words) > 1 and words[1] == "("
         folded = word.casefold()
-        for length, meant in meanings_of(words):
+        for length, replacement in meanings_of(words):
             if not (is_call and length == 1):
-                yield length, meant, LIKELY
-                yield from ((length, s, GUESS) for s in _COURSE_OPERATORS.get(meant, ()))
+                yield length, replacement, LIKELY
+                yield from ((length, s, GUESS) for s in _COURSE_OPERATORS.get(replacement, ()))
         tables = (
             UNITS_MEANT,
             _BRACKETS,
@@ -272,8 +274,8 @@ class _Replacements:
         elif word.casefold() in KEYWORDS:
             yield 1, word.casefold(), SURE
         elif not is_call and len(word) > 2:
-            near = close_matches(word.casefold(), KEYWORDS, n=3)
-            yield from ((1, meant, GUESS) for meant in near)
+            similar = close_matches(word.casefold(), KEYWORDS, n=3)
+            yield from ((1, replacement, GUESS) for replacement in similar)
         if is_call and word not in known_actions():
             named = synonym(word, ACTIONS) or closest(word, known_actions())
             if named is not None:
@@ -285,10 +287,10 @@ _COURSE_OPERATORS = {"and": ("&",), "or": ("|",), "/": ("|",), "||": ("|",), "&&
 """Words of conditions and of other languages -> operators of courses."""
 
 
-def _kinds(meant: str) -> tuple[str, ...]:
-    if meant.startswith("<") and len(meant) > 2:
+def _terminals_for(replacement: str) -> tuple[str, ...]:
+    if replacement.startswith("<") and len(replacement) > 2:
         return ("STAGE",)
-    return _terminals_of(meant) or ("NAME",)
+    return _terminals_of(replacement) or ("NAME",)
 
 
 MOST_WIDENINGS, LONGEST_QUOTE = 6, 120

@@ -166,8 +166,8 @@ class NameCheck:
             yield self.source.fault("E226", what, amount.span, "a plain number", change)
             return
         if amount.unit not in UNITS:
-            meant = UNITS_MEANT.get(amount.unit.casefold())
-            hint = f"did you mean `{meant}`?" if meant else None
+            known_unit = UNITS_MEANT.get(amount.unit.casefold())
+            hint = f"did you mean `{known_unit}`?" if known_unit else None
             if wanted == TIME and amount.unit == "m":
                 hint = "did you mean `min`?"
             what = f"`{amount.unit}` is not a unit{' of time' if wanted == TIME else ''}"
@@ -207,15 +207,15 @@ class NameCheck:
                 yield self.source.fault("E227", what, span, f"such as `{written(meaning)}`")
             elif not meaning.measures and id(span) in compared:
                 what = f"`{name}` is not a quantity, so it cannot be compared"
-                some = sorted(m.name for m in self.actions.values() if m.measures)
-                yield self.source.fault("E228", what, span, f"a quantity: {', '.join(some)}")
+                quantities = sorted(m.name for m in self.actions.values() if m.measures)
+                yield self.source.fault("E228", what, span, f"a quantity: {', '.join(quantities)}")
 
     def ranges(self) -> Iterator[Diagnostic]:
         """Empty ranges."""
         for comparison in self.comparisons:
             ends = [self.task.amount(a) for a in bounds_of(comparison)]
-            alike = len({dimension(e) for e in ends} - {""}) == 1
-            if len(ends) == 2 and alike and value(ends[0]) >= value(ends[1]):
+            same_dimension = len({dimension(e) for e in ends} - {""}) == 1
+            if len(ends) == 2 and same_dimension and value(ends[0]) >= value(ends[1]):
                 what = f"nothing lies between {ends[0]} and {ends[1]}"
                 expected = "the lesser amount first, then a greater one"
                 yield self.source.fault("E238", what, comparison.span, expected)

@@ -119,9 +119,9 @@ class _HintTester:
         complete = [hint for hint, helps in found if helps == COMPLETE]
         if complete:
             # A change that leaves a definition unused may lose less meaning than a complete fix.
-            apart = [usual[0]] if fault.code >= "E2" and usual[1] == PARTIAL else []
+            unused_left = [usual[0]] if fault.code >= "E2" and usual[1] == PARTIAL else []
             return min(
-                (*complete, *apart),
+                (*complete, *unused_left),
                 key=lambda hint: (
                     self.meaning_loss(fault, hint) - (COMMON_FIX_BONUS if hint == usual[0] else 0.0)
                 ),
@@ -204,8 +204,8 @@ class _HintTester:
         """How much a change helps that may leave an unused definition."""
         known = messages(self.faults)
         new = {f.code for f in after if (f.code, f.message) not in known}
-        gone = (fault.code, fault.message) not in messages(after)
-        return PARTIAL if gone and new <= set(UNUSED) else NO_HELP
+        is_fixed = (fault.code, fault.message) not in messages(after)
+        return PARTIAL if is_fixed and new <= set(UNUSED) else NO_HELP
 
 
 UNUSED = ("E204", "E213", "E225")
@@ -267,14 +267,14 @@ def _misspelt(line: str, at: int) -> Iterator[str]:
     """Replacements of misspelt words of the language, nearest to the caret first."""
     for pair in re.finditer(r"(?=\b([a-z]+)\s+([a-z]+)\b)", line):
         swapped = f"{pair[2]} {pair[1]}"
-        for meant in close_matches(swapped, PHRASES, n=1, cutoff=ALIKE):
-            yield f"write `{meant}` in place of `{pair[1]} {pair[2]}`"
+        for phrase in close_matches(swapped, PHRASES, n=1, cutoff=ALIKE):
+            yield f"write `{phrase}` in place of `{pair[1]} {pair[2]}`"
     for match in sorted(LONE_WORD.finditer(line), key=lambda m: _distance(m, at)):
         if match[0] in SYNONYMS:
             yield _hint(line, match, SYNONYMS[match[0]], at)
         elif match[0] not in MEANT_WORDS:
-            for meant in close_matches(match[0].lower(), MEANT_WORDS, n=3, cutoff=ALIKE):
-                yield _hint(line, match, meant, at)
+            for phrase in close_matches(match[0].lower(), MEANT_WORDS, n=3, cutoff=ALIKE):
+                yield _hint(line, match, phrase, at)
 
 
 def _as_expected(fault: Diagnostic) -> Iterator[str]:

@@ -111,18 +111,18 @@ class _Semantics:
             actor_uses = ActorUseCheck(self.parsed.task, self.source, self.uses, self.undefined)
             yield from actor_uses.misspelt_actors()
             yield from actor_uses.unused_actors()
-        whole = not (self.undefined or self.parsed.faults)
+        all_defined = not (self.undefined or self.parsed.faults)
         yield from CourseCheck(
-            self.parsed.task, self.source, self.actions, whole, self.grammar
+            self.parsed.task, self.source, self.actions, all_defined, self.grammar
         ).faults()
         yield from criteria_faults(self.parsed.task, self.source)
         yield from NameCheck(
             self.parsed, self.source, self.actions, self.percepts, self.uses
         ).faults()
-        if whole:
+        if all_defined:
             bounds = list(BoundsCheck(self.grammar, self.source).faults())
             yield from bounds
-        if whole and not bounds:
+        if all_defined and not bounds:
             yield from AmbiguityCheck(self.parsed.task, self.source, self.grammar).faults()
 
     def intended_meaning(self, stage: Stage) -> str:
@@ -135,8 +135,8 @@ class _Semantics:
         if len(names) == 3 and names[1] in self.actions:
             return "infix"
         defined = self.defined
-        meant = all(n in defined and n != stage.name for n in names)
-        return "stages" if meant else ""
+        are_stages = all(n in defined and n != stage.name for n in names)
+        return "stages" if are_stages else ""
 
     @cached_property
     def defined(self) -> set[str]:
@@ -149,17 +149,17 @@ class _Semantics:
             names = [str(n) for n in stage.body.names]
             match self.intended_meaning(stage):
                 case "action":
-                    meant = f"`{names[0]}({', '.join(names[1:]) or '...'})`"
+                    corrected = f"`{names[0]}({', '.join(names[1:]) or '...'})`"
                     what = f"the actors of `{names[0]}` are written without brackets"
-                    yield self.source.fault("E219", what, stage.body.span, meant)
+                    yield self.source.fault("E219", what, stage.body.span, corrected)
                 case "infix":
                     what = f"`{names[1]}` is written between its actors"
-                    meant = f"`{names[1]}({names[0]}, {names[2]})`"
-                    yield self.source.fault("E219", what, stage.body.span, meant)
+                    corrected = f"`{names[1]}({names[0]}, {names[2]})`"
+                    yield self.source.fault("E219", what, stage.body.span, corrected)
                 case "stages":
-                    meant = f"`{' '.join(f'<{n}>' for n in names)}`"
+                    corrected = f"`{' '.join(f'<{n}>' for n in names)}`"
                     what = "stages are referred to without angle brackets"
-                    yield self.source.fault("E220", what, stage.body.span, meant)
+                    yield self.source.fault("E220", what, stage.body.span, corrected)
 
     def reserved(self) -> Iterator[Diagnostic]:
         task = self.parsed.task

@@ -88,28 +88,28 @@ def _with_carrying_of(
     """Rows with the carrying of a pair, if each of its couplings shows it in all runs."""
     carriages = [list(_carriages(row, pair)) for row in rows]
     spans = [
-        [_joint_motion(run, pair, (c.coupling.at, c.until)) for c in mine]
-        for run, mine in zip(runs, carriages, strict=True)
+        [_joint_motion(run, pair, (c.coupling.at, c.until)) for c in of_run]
+        for run, of_run in zip(runs, carriages, strict=True)
     ]
     if not all(span for row in spans for span in row) or any(
         _comes_by_itself(run, c) or _coupled_to_third(row, c)
-        for run, row, mine in zip(runs, rows, carriages, strict=True)
-        for c in mine
+        for run, row, of_run in zip(runs, rows, carriages, strict=True)
+        for c in of_run
     ):
         return [list(row) for row in rows]
     towards = all(
         c.to is not None and _comes_closer(run, c.to, (c.coupling.at, c.until))
-        for run, mine in zip(runs, carriages, strict=True)
-        for c in mine
+        for run, of_run in zip(runs, carriages, strict=True)
+        for c in of_run
     )
     cargo = _cargo(pair, runs, carriages)
     found = []
-    for row, mine, own in zip(rows, carriages, spans, strict=True):
+    for row, of_run, spans_of_run in zip(rows, carriages, spans, strict=True):
         events = [
             _carrying_event(
                 c, span, ("converging", c.to) if towards and c.to else ("moving", (cargo,))
             )
-            for c, span in zip(mine, own, strict=True)
+            for c, span in zip(of_run, spans_of_run, strict=True)
             if span
         ]
         found.append(sorted([*row, *events], key=lambda e: e.at))
@@ -121,10 +121,10 @@ def _carriages(row: EventSequence, pair: Pair) -> Iterator[_Carriage]:
         if event.symbol != ("coupled", pair):
             continue
         later = [e for e in row[k + 1 :] if set(e.symbol[1]) & set(pair)]
-        meets = (
+        meetings = (
             e for e in later if e.symbol[0] in MEETINGS and len(set(e.symbol[1]) & set(pair)) == 1
         )
-        meeting = next(meets, None)
+        meeting = next(meetings, None)
         if meeting is not None and meeting.at > event.interval.end:
             meeting = None
         until = meeting.at if meeting is not None else event.interval.end
@@ -188,9 +188,9 @@ def _cargo(pair: Pair, runs: Sequence[RunTrace], carriages: Sequence[Sequence[_C
 
     def before(name: str) -> float:
         return sum(
-            max(0.0, min(b, mine[0].coupling.at) - a)
-            for run, mine in zip(runs, carriages, strict=True)
-            if mine
+            max(0.0, min(b, of_run[0].coupling.at) - a)
+            for run, of_run in zip(runs, carriages, strict=True)
+            if of_run
             for a, b in run.moves.get(name, ())
         )
 

@@ -141,8 +141,8 @@ class Draft:
         if isinstance(item, Proximity):
             return f"<{name}> ::= {action_text(item)} for {item.least_s:g} s  # {seen}"
         if not spans or (self._is_last(occurrence) and not self._final_facts()):
-            held = self._least_hold_s(occurrence) if self._is_last(occurrence) else 0.0
-            course = self._stage_body(occurrence, f" for {held:g} s" if held else "")
+            hold_s = self._least_hold_s(occurrence) if self._is_last(occurrence) else 0.0
+            course = self._stage_body(occurrence, f" for {hold_s:g} s" if hold_s else "")
             return f"<{name}> ::= {course}  # {seen}"
         duration_text = f"{min(spans):.1f} to {max(spans):.1f} s"
         if self.release is not None and self._is_last(occurrence):
@@ -187,16 +187,18 @@ class Draft:
             return f"<{STAY_STAGE}> ::= {body}  # in {all_runs_text(len(self.runs))}"
         if final is None or not facts:
             return ""
-        held = self._least_hold_s(final)
-        clause = f" for {held:g} s" if held else ""
+        hold_s = self._least_hold_s(final)
+        clause = f" for {hold_s:g} s" if hold_s else ""
         facts_text = " & ".join([action_text(final[0]), *facts])
         return f"<{STAY_STAGE}> ::= ({facts_text}){clause}  # in {all_runs_text(len(self.runs))}"
 
     def _carrying_failure(self, item: CarryingStage) -> str:
         """The condition under which carrying fails: the two are apart for longer than relations flicker."""
-        apart = action_text(("apart", item.parts[0][1]))
+        separated = action_text(("apart", item.parts[0][1]))
         return (
-            f" fails when {apart} for {LONGEST_BRIDGED_GAP_S:g} s" if self.carrying_may_fail else ""
+            f" fails when {separated} for {LONGEST_BRIDGED_GAP_S:g} s"
+            if self.carrying_may_fail
+            else ""
         )
 
     def _is_last(self, occurrence: Occurrence) -> bool:

@@ -232,9 +232,9 @@ def _forbid_events_of(draft: Draft, run: RunTrace) -> None:
     allowed = {interval.symbol for r in draft.runs for interval in r.intervals}
     actors = {a for r in draft.runs for interval in r.intervals for a in interval.symbol[1]}
     for interval in run.intervals:
-        action, who = interval.symbol
+        action, pair = interval.symbol
         new = interval.symbol not in allowed and interval.symbol not in draft.forbidden
-        if new and action in FORBIDDEN and actors.intersection(who):
+        if new and action in FORBIDDEN and actors.intersection(pair):
             draft.forbidden.append(interval.symbol)
 
 

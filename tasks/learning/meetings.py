@@ -87,18 +87,19 @@ def meetings_of(runs: Sequence[RunTrace], pairs: Sequence[Pair]) -> list[list[Me
         runs: The runs.
         pairs: All pairs; of several that meet through each other the first is dropped.
     """
-    kept = [_meetings(run) for run in runs]
+    meetings = [_meetings(run) for run in runs]
     for pair in pairs:
-        runs_meeting = sum(any(m.pair == pair for m in row) for row in kept)
+        runs_meeting = sum(any(m.pair == pair for m in row) for row in meetings)
         runs_carried = sum(
-            any(m.pair == pair and _is_merely_carried(m, row, 1) for m in row) for row in kept
+            any(m.pair == pair and _is_merely_carried(m, row, 1) for m in row) for row in meetings
         )
         if runs_carried > CARRIED_RUNS_SHARE * runs_meeting:
             # In the other runs a looser tolerance is then enough.
-            kept = [
-                [m for m in r if m.pair != pair or not _is_merely_carried(m, r, 2)] for r in kept
+            meetings = [
+                [m for m in r if m.pair != pair or not _is_merely_carried(m, r, 2)]
+                for r in meetings
             ]
-    return kept
+    return meetings
 
 
 def _meetings(run: RunTrace) -> list[Meeting]:

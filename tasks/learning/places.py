@@ -186,8 +186,8 @@ def _least_shared(
 
 def _stays(row: EventSequence, contact: Symbol) -> bool:
     """Whether a contact lasts to the end of a run."""
-    mine = [e for e in row if contact in symbols_of(e.item)]
-    return bool(mine) and mine[-1].lasts_to_end
+    events = [e for e in row if contact in symbols_of(e.item)]
+    return bool(events) and events[-1].lasts_to_end
 
 
 def _shared_over_time(minds: Sequence[Mind], pair: Sequence[str], within: Span) -> list[float]:

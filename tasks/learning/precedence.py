@@ -51,13 +51,13 @@ def precedences(
     for earlier, later in pairwise(lasting):
         times = [(_at(row, earlier[0]), _at(row, later[0])) for row in rows]
         contacts = _contacts_with_resting_actor(earlier[0], later[0], runs)
-        apart = all(b - a > APART_S for a, b in times)
+        separated = all(b - a > APART_S for a, b in times)
         early = any(
             _held_before(run, contact, first_begin)
             for run, (first_begin, _) in zip(runs, times, strict=True)
             for contact in contacts
         )
-        if contacts and apart and not early:
+        if contacts and separated and not early:
             first = _contacts(earlier[0])[0]
             yield Precedence(contacts, first, tuple(stages[: stages.index(earlier) + 1]))
 
@@ -94,8 +94,8 @@ def _contacts_with_resting_actor(
 ) -> tuple[Symbol, ...]:
     """The later contacts with the actor of the earlier contact that moves less."""
     actors = {a for _, pair in _contacts(earlier) for a in pair}
-    still = min(sorted(actors), key=lambda a: moved_s(runs, a), default="")
-    return tuple(s for s in _contacts(later) if still in s[1] and s not in _contacts(earlier))
+    resting = min(sorted(actors), key=lambda a: moved_s(runs, a), default="")
+    return tuple(s for s in _contacts(later) if resting in s[1] and s not in _contacts(earlier))
 
 
 def _contacts(item: Item) -> tuple[Symbol, ...]:

@@ -93,7 +93,7 @@ def test_rows_are_what_was_believed_at_each_step(tmp_path: Path) -> None:
     ]
 
 
-def test_written_views_are_read_back(run: Recording, tables: RunTables, tmp_path: Path) -> None:
+def test_written_tables_are_read_back(run: Recording, tables: RunTables, tmp_path: Path) -> None:
     lake = Lake.create(tmp_path / "lake")
     assert lake.commit(tables, run, run_inputs(DOCK))
     assert not lake.commit(tables, run, run_inputs(DOCK))

@@ -75,11 +75,16 @@ def sketch_distances(query: NDArray[np.int8], sketches: NDArray[np.int8]) -> NDA
     Returns:
         (V,) float32, 0 for equal sketches; for plain outlines smaller differences count more.
     """
-    own, others = query.astype(np.float32) / _UNIT, sketches.astype(np.float32) / np.float32(_UNIT)
+    query_heights, others = (
+        query.astype(np.float32) / _UNIT,
+        sketches.astype(np.float32) / np.float32(_UNIT),
+    )
     # The mirror image has both axes reversed.
-    turned = np.stack([own, own[::-1, ::-1]])[:, _TURNS].reshape(2 * POINTS, -1)
-    alike = (others.reshape(len(others), -1) @ turned.T).max(axis=1)
-    squares = (own**2).sum() + (others**2).sum(axis=(1, 2)) - 2 * alike
+    rotated = np.stack([query_heights, query_heights[::-1, ::-1]])[:, _TURNS].reshape(
+        2 * POINTS, -1
+    )
+    correlations = (others.reshape(len(others), -1) @ rotated.T).max(axis=1)
+    squares = (query_heights**2).sum() + (others**2).sum(axis=(1, 2)) - 2 * correlations
     mean = np.sqrt(np.maximum(squares, 0.0) / (POINTS * HEIGHTS))
-    varied = own.std(axis=0).mean() + others.std(axis=1).mean(axis=1)
+    varied = query_heights.std(axis=0).mean() + others.std(axis=1).mean(axis=1)
     return np.asarray(mean / (_BETA + varied), dtype=np.float32)

@@ -69,11 +69,11 @@ def _clustered(
     cell = cell.ravel()
     counts = np.bincount(cell)
     merged = np.stack([np.bincount(cell, points[:, k]) / counts for k in range(3)], axis=1)
-    moved = cell[faces].astype(np.int32)
-    a, b, c = moved.T
-    whole = moved[(a != b) & (b != c) & (c != a)]
-    _, first = np.unique(np.sort(whole, axis=1), axis=0, return_index=True)
-    return merged, whole[np.sort(first)]
+    clustered_faces = cell[faces].astype(np.int32)
+    a, b, c = clustered_faces.T
+    not_degenerate = clustered_faces[(a != b) & (b != c) & (c != a)]
+    _, first = np.unique(np.sort(not_degenerate, axis=1), axis=0, return_index=True)
+    return merged, not_degenerate[np.sort(first)]
 
 
 def mesh_bytes(model: MeshModel) -> tuple[bytes, bytes]:

@@ -301,9 +301,9 @@ class PoseRefiner:
         fits = fitted_poses(mesh, image, starts, steps=steps, focal_px=focal)[:most]
         if steps is not COARSE_STEPS:
             return fits
-        near = [f.orientation for f in fits]
-        fine = fitted_poses(mesh, image, near, steps=FINE_STEPS, focal_px=focal)
-        return [replace(f, start=fits[f.start].start) for f in fine]
+        best_orientations = [f.orientation for f in fits]
+        refined = fitted_poses(mesh, image, best_orientations, steps=FINE_STEPS, focal_px=focal)
+        return [replace(f, start=fits[f.start].start) for f in refined]
 
     def _stored(
         self,

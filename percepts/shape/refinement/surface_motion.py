@@ -77,10 +77,10 @@ class SurfaceImage:
         positions, forward_status, _ = cv2.calcOpticalFlowPyrLK(
             self.grey, now, self.points, self.points.copy(), winSize=_WINDOW
         )
-        back, backward_status, _ = cv2.calcOpticalFlowPyrLK(
+        tracked_back, backward_status, _ = cv2.calcOpticalFlowPyrLK(
             now, self.grey, positions, positions.copy(), winSize=_WINDOW
         )
-        round_trip = np.hypot(*(back - self.points).T)
+        round_trip = np.hypot(*(tracked_back - self.points).T)
         found = (
             (forward_status[:, 0] > 0) & (backward_status[:, 0] > 0) & (round_trip < _RETURNS_PX)
         )
@@ -256,6 +256,6 @@ def rotation_since(positions: Floats, image_points: Floats, distance: float) -> 
 
 def _projected(positions: Floats, motion: Floats, distance: float) -> Floats:
     """(N, 2) projections of points of a body after a rotation (3), a shift (2) and a change of scale (1)."""
-    turned = Rotation.from_rotvec(motion[:3]).apply(positions)
-    nearer = np.exp(motion[5]) / (1 + turned[:, 2:] / distance)
-    return np.asarray(turned[:, :2] * nearer + motion[3:5], np.float64)
+    rotated = Rotation.from_rotvec(motion[:3]).apply(positions)
+    scale = np.exp(motion[5]) / (1 + rotated[:, 2:] / distance)
+    return np.asarray(rotated[:, :2] * scale + motion[3:5], np.float64)

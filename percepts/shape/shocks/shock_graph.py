@@ -289,11 +289,11 @@ def _directions(
         towards_end: (N,) share of the area towards the end of each node's branch.
     """
     reach = np.minimum(OUTLOOK, 0.5 * lengths)
-    forth = tree.points_at(middle.branch, middle.offset + reach)
-    way = forth - tree.points_at(middle.branch, middle.offset - reach)
-    way *= np.where(towards_end > 0.5, -1.0, 1.0)[:, None]
-    length = np.hypot(*way.T)[:, None]
-    return np.where(length > 1e-9, way / np.maximum(length, 1e-9), 0.0)
+    ahead = tree.points_at(middle.branch, middle.offset + reach)
+    vector = ahead - tree.points_at(middle.branch, middle.offset - reach)
+    vector *= np.where(towards_end > 0.5, -1.0, 1.0)[:, None]
+    length = np.hypot(*vector.T)[:, None]
+    return np.where(length > 1e-9, vector / np.maximum(length, 1e-9), 0.0)
 
 
 class NodeArrays(TypedDict):

@@ -168,8 +168,8 @@ def directed_contexts(
     dx = area[:, 0] - positions[:, :1]
     dy = area[:, 1] - positions[:, 1:]
     ahead = dx * directions[:, :1] + dy * directions[:, 1:]
-    aside = np.abs(dy * directions[:, :1] - dx * directions[:, 1:])
-    angle = np.arctan2(aside, ahead) * ((ANGLES - 1) / np.pi)
+    sideways = np.abs(dy * directions[:, :1] - dx * directions[:, 1:])
+    angle = np.arctan2(sideways, ahead) * ((ANGLES - 1) / np.pi)
     ring, angle_low = _rings(path_lengths), np.minimum(angle.astype(np.intp), ANGLES - 2)
     ring_low = np.minimum(ring.astype(np.intp), RINGS - 2)
     ring_share, angle_share = ring - ring_low, angle - angle_low

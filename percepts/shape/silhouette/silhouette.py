@@ -160,9 +160,9 @@ def _crop(mask: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], tuple[int, int], 
 
 def _solid(part: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], tuple[int, int]]:
     """The joined parts, holes filled, and the corner."""
-    whole = join_fragments(part)
-    x, y, w, h = cv2.boundingRect(whole.astype(np.uint8))
-    inside = whole[y : y + h, x : x + w]
+    joined = join_fragments(part)
+    x, y, w, h = cv2.boundingRect(joined.astype(np.uint8))
+    inside = joined[y : y + h, x : x + w]
     around = np.pad((~inside).astype(np.uint8), 1, constant_values=1)
     _, outside = cv2.connectedComponents(around, connectivity=4)
     return np.asarray(outside[1:-1, 1:-1] != outside[0, 0], dtype=np.uint8), (x, y)
