@@ -35,7 +35,7 @@ from visup.commands.step import step
 from visup.commands.task.task import app as task_app
 from visup.commands.teach import OutlineCommand, teach
 from visup.commands.watch import demo, watch
-from visup.terminal.console import complain, echo
+from visup.terminal.console import echo, print_error
 from visup.terminal.overview import Overview
 
 BAD_INPUT = 2
@@ -116,11 +116,11 @@ def main() -> None:
             check_memory()
         command()()
     except VisupError as error:
-        complain(str(error))
+        print_error(str(error))
         sys.exit(BAD_INPUT)
     except MemoryError as fault:
         hint = "use smaller frames or files; a run that had started can be resumed"
-        complain(str(VisupError(f"out of memory: {fault}".rstrip(": "), hint=hint)))
+        print_error(str(VisupError(f"out of memory: {fault}".rstrip(": "), hint=hint)))
         sys.exit(FAILED)
     except BrokenPipeError:
         # The reader (such as `head`) went away; nothing more can be said to it.

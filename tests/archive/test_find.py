@@ -94,7 +94,7 @@ def test_what_is_found_is_what_the_agent_says(
                     assert reading.truth == said[meant["a"], meant["b"]], CONDITIONS[n]
                     compared += 1
 
-        replay(recording, replace(settings, rules=(rules,)), tell=look)
+        replay(recording, replace(settings, rules=(rules,)), on_step=look)
         for n, judge in enumerate(judges):
             hits = tuple(h for h in judge.hits() if h.truth == Truth.TRUE)
             assert not hits or run in possible[n], CONDITIONS[n]
@@ -258,7 +258,7 @@ def test_a_sequence_is_true_once_it_is_complete(tmp_path: Path) -> None:
         truths.append((step.time, held[0], held[1], held[2]))
 
     recording, settings = lake.recorded(key)
-    replay(recording, settings, tell=look)
+    replay(recording, settings, on_step=look)
     assert any(t[3] for t in truths)
     for n, (time, _, second, both) in enumerate(truths):
         # A sample speaks until the next one.

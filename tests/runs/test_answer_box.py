@@ -18,7 +18,7 @@ from visup.agent import Frame
 from visup.agent.model.errors import OutputError, SettingsError
 from visup.agent.model.step import Step
 from visup.agent.storage.journal_reader import Recording
-from visup.runs.inputs.answer_box import ANSWERS, LARGEST_FILE, AnswerBox, put_answer
+from visup.runs.inputs.answer_box import ANSWERS, MAX_FILE_BYTES, AnswerBox, put_answer
 from visup.runs.inputs.audience import Audience
 from visup.runs.inputs.run_folder import fresh_folder
 from visup.runs.runner import supervise
@@ -103,7 +103,7 @@ def test_an_answer_is_one_line_and_there_are_not_endlessly_many(tmp_path: Path) 
         put_answer(tmp_path, 2, "# nobody")
     with pytest.raises(OutputError, match="cannot be written"):
         put_answer(tmp_path / "nowhere", 2, "arm")
-    (tmp_path / ANSWERS).write_text("#" * LARGEST_FILE)
+    (tmp_path / ANSWERS).write_text("#" * MAX_FILE_BYTES)
     with pytest.raises(OutputError, match="too many"):
         put_answer(tmp_path, 2, "arm")
 

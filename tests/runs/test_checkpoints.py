@@ -15,7 +15,7 @@ from visup.agent.cycle.agent import Agent
 from visup.agent.storage.checkpoint import dump_state
 from visup.agent.storage.seal import KEY_FILE, own_key, seal
 from visup.runs import checkpoints
-from visup.runs.checkpoints import CHECKPOINT, PACKED, CheckpointWriter, read_checkpoint
+from visup.runs.checkpoints import CHECKPOINT, COMPRESSED, CheckpointWriter, read_checkpoint
 from visup.version import __version__
 
 
@@ -23,11 +23,11 @@ from visup.version import __version__
 def test_states_write_no_more_than_they_may_in_an_hour(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, size: int
 ) -> None:
-    monkeypatch.setattr(checkpoints, "BYTES_AN_HOUR", 16_000.0)
-    monkeypatch.setattr(checkpoints, "BYTES_AT_ONCE", 4_000.0)
+    monkeypatch.setattr(checkpoints, "BYTES_PER_HOUR", 16_000.0)
+    monkeypatch.setattr(checkpoints, "BURST_BYTES", 4_000.0)
     writer = CheckpointWriter(tmp_path, every_s=30.0)
     data = random.Random(1).randbytes(size)  # cannot be compressed
-    monkeypatch.setattr(CheckpointWriter, "_frozen", lambda *_: data)
+    monkeypatch.setattr(CheckpointWriter, "_serialised", lambda *_: data)
     written = []
     for step in Agent([Scripted("eye", ("x",))]).steps(frames(7200, fps=1.0)):
         writer.offer(None, step, dict)  # type: ignore[arg-type]
@@ -43,7 +43,7 @@ def test_states_write_no_more_than_they_may_in_an_hour(
 @pytest.mark.parametrize(
     ("holder", "name", "fault"),
     [
-        (CheckpointWriter, "_frozen", MemoryError()),
+        (CheckpointWriter, "_serialised", MemoryError()),
         (ThreadPoolExecutor, "submit", RuntimeError("can't start new thread")),
     ],
 )
@@ -51,7 +51,7 @@ def test_a_state_that_there_is_no_memory_for_ends_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, holder: type, name: str, fault: Exception
 ) -> None:
     faults = [fault]
-    monkeypatch.setattr(CheckpointWriter, "_frozen", lambda *_: b"later")
+    monkeypatch.setattr(CheckpointWriter, "_serialised", lambda *_: b"later")
     usual = getattr(holder, name)
 
     def fails_once(*words: object) -> object:
@@ -72,7 +72,7 @@ def write_state(folder: Path, packed: bytes) -> None:
     (folder / CHECKPOINT).write_bytes(seal(packed, own_key()))
 
 
-SOUND = PACKED + zlib.compress(
+SOUND = COMPRESSED + zlib.compress(
     dump_state({"visup": __version__, "frame_index": 7, "agent": {}, "kept": {}})
 )
 
@@ -123,16 +123,16 @@ def test_where_no_key_can_be_kept_no_state_is_and_it_is_told(
 def test_a_state_is_compressed_and_reads_back(tmp_path: Path) -> None:
     state = {"visup": __version__, "frame_index": 7, "agent": {}, "kept": {"a": [1, 2]}}
     data = dump_state(state)
-    write_state(tmp_path, PACKED + zlib.compress(data))
+    write_state(tmp_path, COMPRESSED + zlib.compress(data))
     found, why = read_checkpoint(tmp_path)
     assert why is None
     assert found is not None
-    assert (found.frame_index, found.kept) == (7, {"a": [1, 2]})
+    assert (found.frame_index, found.recorder) == (7, {"a": [1, 2]})
 
 
 def test_a_state_of_another_version_is_none_and_says_which(tmp_path: Path) -> None:
     state = {"visup": "0.0.9", "frame_index": 7, "agent": {}, "kept": {}}
-    write_state(tmp_path, PACKED + zlib.compress(dump_state(state)))
+    write_state(tmp_path, COMPRESSED + zlib.compress(dump_state(state)))
     assert read_checkpoint(tmp_path) == (None, "its checkpoint is of visup 0.0.9")
 
 
@@ -144,10 +144,10 @@ def _flipped(data: bytes) -> bytes:
     return data[:40] + bytes([data[40] ^ 1]) + data[41:]
 
 
-@pytest.mark.parametrize("damage", [_cut, _flipped, lambda data: PACKED, lambda data: data[:3]])
+@pytest.mark.parametrize("damage", [_cut, _flipped, lambda data: COMPRESSED, lambda data: data[:3]])
 def test_a_damaged_state_is_none_and_says_why(tmp_path: Path, damage: Any) -> None:
     data = dump_state({"visup": __version__, "frame_index": 7, "agent": {}, "kept": {}})
-    write_state(tmp_path, damage(PACKED + zlib.compress(data)))
+    write_state(tmp_path, damage(COMPRESSED + zlib.compress(data)))
     found, why = read_checkpoint(tmp_path)
     assert found is None
     assert why
@@ -156,6 +156,6 @@ def test_a_damaged_state_is_none_and_says_why(tmp_path: Path, damage: Any) -> No
 def test_a_state_that_would_fill_the_memory_is_none(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(checkpoints, "LARGEST_STATE_BYTES", 10**6)
-    write_state(tmp_path, PACKED + zlib.compress(bytes(10**8)))
+    monkeypatch.setattr(checkpoints, "MAX_STATE_BYTES", 10**6)
+    write_state(tmp_path, COMPRESSED + zlib.compress(bytes(10**8)))
     assert read_checkpoint(tmp_path) == (None, "it is cut off or too large")

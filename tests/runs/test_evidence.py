@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from tests.clips import moving_disc, write_clip
 from visup.agent import Alert, Frame, Mind, Observation, Severity
 from visup.agent.model.step import Step
-from visup.runs.evidence.clip_spool import SUFFIX, ClipSpool, evenly, spooled
-from visup.runs.evidence.frame_ring import SAME_S, EncodedFrame, FrameEncoder, FrameRing
+from visup.runs.evidence.clip_spool import SUFFIX, ClipSpool, at_constant_rate, spooled
+from visup.runs.evidence.frame_ring import MAX_REUSE_S, EncodedFrame, FrameEncoder, FrameRing
 from visup.runs.evidence.keeper import EVIDENCE, EvidenceKeeper
 from visup.runs.runner import fresh_folder, supervise
 from visup.runs.settings import EvidenceOptions, RunOptions, WatchSettings
@@ -57,14 +57,14 @@ def test_what_is_kept_shows_all_that_can_be_seen_and_is_never_older_than_a_secon
         assert frame.time == time
         if frame.jpeg != kept:
             kept, shown_at = frame.jpeg, time
-        assert time - shown_at < SAME_S
+        assert time - shown_at < MAX_REUSE_S
         assert not moved or shown_at == time
 
 
 @given(TIMES, st.floats(1.0, 30.0))
 def test_a_clip_lasts_as_long_as_what_it_shows(times: list[float], fps: float) -> None:
     frames = [EncodedFrame(t, b"") for t in times]
-    shown = list(evenly(frames, fps))
+    shown = list(at_constant_rate(frames, fps))
     assert [f.time for f in shown] == sorted(f.time for f in shown)
     if frames:
         assert abs((len(shown) - 1) / fps - (times[-1] - times[0])) <= 1.0 / fps + 1e-6

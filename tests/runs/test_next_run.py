@@ -22,7 +22,7 @@ from visup.runs.recorder import Recorder
 from visup.runs.resume import interrupted_run
 from visup.runs.runner import fresh_folder, supervised
 from visup.runs.settings import RunOptions, WatchSettings
-from visup.runs.unattended.next_run import TRY_AGAIN_S, RollOver
+from visup.runs.unattended.next_run import RETRY_S, RollOver
 from visup.serving.run_store import RunStore, begin_run, run_under_way
 
 RULE = 'rule seen(a): warning\n    when in_view(a) > 0.1 s\n    say "{a} {is} seen."\n'
@@ -45,8 +45,8 @@ def test_so_it_does_when_its_journal_is_large_and_it_is_tried_again_later() -> N
     assert not roll.due(0.0, 99)
     assert roll.due(1.0, 100)
     roll.failed(1.0)
-    assert not roll.due(1.0 + TRY_AGAIN_S / 2, 500)
-    assert roll.due(1.0 + TRY_AGAIN_S, 500)
+    assert not roll.due(1.0 + RETRY_S / 2, 500)
+    assert roll.due(1.0 + RETRY_S, 500)
 
 
 class Camera:
@@ -132,7 +132,7 @@ def test_a_next_run_that_cannot_be_begun_leaves_no_folder(
         return Recorder(settings, source, folder, *rest, **more)
 
     monkeypatch.setattr("visup.runs.runner.Recorder", begun)
-    monkeypatch.setattr("visup.runs.unattended.next_run.TRY_AGAIN_S", 0.0)
+    monkeypatch.setattr("visup.runs.unattended.next_run.RETRY_S", 0.0)
     camera.watch(60)
     assert refused
     folders = [f for f in camera.store.folder.iterdir() if f.is_dir()]

@@ -139,7 +139,7 @@ def test_a_state_of_an_earlier_form_is_told_and_all_is_perceived_again(
     assert past.state is not None
     earlier = {
         "agent": replace(past.state, agent={"thoughts": 1}),
-        "kept": replace(past.state, kept={"pages": ()}),
+        "kept": replace(past.state, recorder={"pages": ()}),
         "behaviours": replace(past.state, agent={**past.state.agent, "behaviours": {"eyes": {}}}),
     }
     past = replace(past, state=earlier[part])

@@ -63,5 +63,5 @@ def told_of_clip(folder: Path) -> Told:
 def told_of_run(run: Path) -> Told:
     """What is told of a recorded run when it is reasoned about again."""
     recording, steps = Recording.open(run), list[Step]()
-    replay(recording, settings_for(recording), tell=steps.append)
+    replay(recording, settings_for(recording), on_step=steps.append)
     return told_of(steps)

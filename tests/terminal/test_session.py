@@ -159,7 +159,7 @@ def test_a_whole_session_can_be_scripted() -> None:
 def test_help_of_each_command_fits_80_columns() -> None:
     for command in COMMANDS.values():
         assert all(len(line) <= 80 for line in command.text.splitlines())
-        assert command.does
+        assert command.effect
 
 
 def test_every_command_has_its_help_and_no_other() -> None:

@@ -83,7 +83,7 @@ def run_tables(
         if also:
             also(step)
 
-    replay(recording, settings, tell=tell)
+    replay(recording, settings, on_step=tell)
     tables = {
         "runs": [_run_row(facts, settings, steps, given)],
         "events": list(_event_rows(recording.events())),

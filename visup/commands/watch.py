@@ -261,7 +261,7 @@ def _as_json(result: RunResult) -> dict[str, object]:
 def _closing_lines(result: RunResult) -> Iterator[str]:
     from rich.markup import escape
 
-    from visup.terminal.narrator import part_seen, verdict_line
+    from visup.terminal.narrator import verdict_line, watched_part
 
     if result.problem:
         yield f"[yellow]The source: {escape(result.problem)}[/yellow]"
@@ -271,4 +271,4 @@ def _closing_lines(result: RunResult) -> Iterator[str]:
         yield f"Report:  {escape(str(result.report))}"
     elif result.folder:
         yield f"Run:     {escape(str(result.folder))}"
-    yield verdict_line(result.verdict, has_task=result.has_task, part=part_seen(result))
+    yield verdict_line(result.verdict, has_task=result.has_task, part=watched_part(result))

@@ -21,14 +21,14 @@ from visup.agent.storage.text_file import read_bounded
 from visup.version import __version__
 
 CHECKPOINT = "state.bin"
-LARGEST_STATE_BYTES = 2**30
-HELD_IN = ("visup.runs.wiring", "visup.report.collector")
+MAX_STATE_BYTES = 2**30
+STATE_MODULES = ("visup.runs.wiring", "visup.report.collector")
 """Modules whose classes, with those they import, may be in a state; reading instantiates only loaded
 classes."""
-PACKED = b"VISUPSTZ"
+COMPRESSED = b"VISUPSTZ"
 """Prefix of a compressed state."""
-BYTES_AN_HOUR = 160e6
-BYTES_AT_ONCE = 40e6
+BYTES_PER_HOUR = 160e6
+BURST_BYTES = 40e6
 """Write budget of states per hour of the source, and its burst size: at most 200 MB in any hour. Between two
 states nearly all data of behaviours change, so that differences would be no smaller; compressed, a state has
 an eighth of its size. Large states are saved less often."""
@@ -41,12 +41,12 @@ class Checkpoint:
     Attributes:
         frame_index: Number of the step's frame.
         agent: State for `Agent.load`.
-        kept: State of the recorder.
+        recorder: State of the recorder.
     """
 
     frame_index: int
     agent: Mapping[str, Any]
-    kept: Mapping[str, Any]
+    recorder: Mapping[str, Any]
 
 
 class CheckpointWriter:
@@ -68,58 +68,62 @@ class CheckpointWriter:
         self.written = 0
         self._path = folder / CHECKPOINT
         self._every_s = every_s
-        self._last: float | None = None
+        self._last_saved: float | None = None
         self._disk = ThreadPoolExecutor(max_workers=1, thread_name_prefix="state")
-        self._seen: float | None = None
+        self._last_offered: float | None = None
         self._writing: Future[None] | None = None
-        self._left = BYTES_AT_ONCE
+        self._write_budget = BURST_BYTES
         self._size = 0.0
 
-    def offer(self, agent: Agent, step: Step, kept: Callable[[], Mapping[str, Any] | None]) -> None:
+    def offer(
+        self, agent: Agent, step: Step, recorder_state: Callable[[], Mapping[str, Any] | None]
+    ) -> None:
         """Save the state after a step if it is due.
 
         Args:
             agent: The agent after the step.
             step: The step, already in the journal.
-            kept: Gives the state of the recorder; None if no state can be saved now.
+            recorder_state: Gives the state of the recorder; None if no state can be saved now.
         """
-        self._last = step.time if self._last is None else self._last
-        if self._seen is not None:
-            saved = max(0.0, step.time - self._seen) * BYTES_AN_HOUR / 3600.0
-            self._left = min(BYTES_AT_ONCE, self._left + saved)
-        self._seen = step.time
+        self._last_saved = step.time if self._last_saved is None else self._last_saved
+        if self._last_offered is not None:
+            saved = max(0.0, step.time - self._last_offered) * BYTES_PER_HOUR / 3600.0
+            self._write_budget = min(BURST_BYTES, self._write_budget + saved)
+        self._last_offered = step.time
         busy = self._writing is not None and not self._writing.done()
-        early = step.time - self._last < self._every_s or self._left < min(
-            self._size, BYTES_AT_ONCE
+        early = step.time - self._last_saved < self._every_s or self._write_budget < min(
+            self._size, BURST_BYTES
         )
         if not self._every_s or self.note or busy or early:
             return
-        self._last = step.time
-        remembered = kept()
-        data = None if remembered is None else self._data(agent, step, remembered)
+        self._last_saved = step.time
+        recorder = recorder_state()
+        data = None if recorder is None else self._serialised_or_none(agent, step, recorder)
         if data is not None:
             with suppress(RuntimeError):  # no memory for a thread
                 self._writing = self._disk.submit(self._write, data)
 
-    def keep(self, agent: Agent, step: Step, kept: Mapping[str, Any] | None) -> None:
+    def keep(self, agent: Agent, step: Step, recorder: Mapping[str, Any] | None) -> None:
         """Save the state after a step at once, and wait until it is on disk.
 
         Args:
             agent: The agent after the step.
             step: The step, already in the journal.
-            kept: State of the recorder; None if no state can be saved now.
+            recorder: State of the recorder; None if no state can be saved now.
         """
-        if not self._every_s or self.note or kept is None:
+        if not self._every_s or self.note or recorder is None:
             return
-        self._last = step.time
-        data = self._data(agent, step, kept)
+        self._last_saved = step.time
+        data = self._serialised_or_none(agent, step, recorder)
         if data is not None:
             self._disk.submit(self._write, data).result()
 
-    def _data(self, agent: Agent, step: Step, kept: Mapping[str, Any]) -> bytes | None:
+    def _serialised_or_none(
+        self, agent: Agent, step: Step, recorder: Mapping[str, Any]
+    ) -> bytes | None:
         """The serialised state, or None if it cannot be saved."""
         try:
-            data = self._frozen(agent, step, kept)
+            data = self._serialised(agent, step, recorder)
         except StateError as fault:
             self.note = _not_saved_note(fault)
             return None
@@ -129,19 +133,19 @@ class CheckpointWriter:
         return data
 
     def _write(self, data: bytes) -> None:
-        packed = seal(PACKED + zlib.compress(data, 1), self._key)
+        packed = seal(COMPRESSED + zlib.compress(data, 1), self._key)
         # On failure the older state stays; disk faults are reported for the journal.
         with suppress(OSError):
             write_atomically(self._path, packed)
         self.written += len(packed)
         self._size = float(len(packed))
-        self._left -= len(packed)
+        self._write_budget -= len(packed)
 
     def close(self) -> None:
         """Wait for the disk."""
         self._disk.shutdown(wait=True)
 
-    def _frozen(self, agent: Agent, step: Step, kept: Mapping[str, Any]) -> bytes:
+    def _serialised(self, agent: Agent, step: Step, recorder: Mapping[str, Any]) -> bytes:
         state = agent.save()
         if state["behaviours"] is None:
             raise StateError("a behaviour has no save and load")
@@ -150,7 +154,7 @@ class CheckpointWriter:
                 "visup": __version__,
                 "frame_index": step.frame_index,
                 "agent": state,
-                "kept": dict(kept),
+                "kept": dict(recorder),
             }
         )
 
@@ -173,31 +177,31 @@ def read_checkpoint(folder: Path) -> tuple[Checkpoint | None, str | None]:
     Returns:
         The state, or None if there is no usable one; and why an existing state is not usable.
     """
-    for name in HELD_IN:
+    for name in STATE_MODULES:
         import_module(name)
     try:
-        packed = unsealed(read_bounded(folder / CHECKPOINT, LARGEST_STATE_BYTES))
-        told = load_state(_unpacked(packed))
-        if told["visup"] != __version__:
-            return None, f"its checkpoint is of visup {told['visup']}"
-        return Checkpoint(int(told["frame_index"]), told["agent"], told["kept"]), None
+        packed = unsealed(read_bounded(folder / CHECKPOINT, MAX_STATE_BYTES))
+        state = load_state(_decompressed(packed))
+        if state["visup"] != __version__:
+            return None, f"its checkpoint is of visup {state['visup']}"
+        return Checkpoint(int(state["frame_index"]), state["agent"], state["kept"]), None
     except FileNotFoundError:
         return None, None
     except (OSError, OutputError, KeyError, TypeError, ValueError) as fault:
         return None, str(fault)
 
 
-def _unpacked(data: bytes) -> bytes:
+def _decompressed(data: bytes) -> bytes:
     """The decompressed state.
 
     Raises:
         ValueError: It is damaged or too large.
     """
-    if not data.startswith(PACKED):
+    if not data.startswith(COMPRESSED):
         return data
     inflater = zlib.decompressobj()
     try:
-        state = inflater.decompress(data[len(PACKED) :], LARGEST_STATE_BYTES)
+        state = inflater.decompress(data[len(COMPRESSED) :], MAX_STATE_BYTES)
     except zlib.error as fault:
         raise ValueError("its check sum is wrong") from fault
     if not inflater.eof:

@@ -22,7 +22,7 @@ class MonotonicFrames:
 
     def __init__(self, frames: Iterable[Frame], fps: float, after: float | None = None) -> None:
         self._frames = iter(frames)
-        self._pause = 1.0 / fps
+        self._period = 1.0 / fps
         self._last = after
         self._shift = 0.0
         self._reported: str | None = None
@@ -34,7 +34,7 @@ class MonotonicFrames:
         frame = next(self._frames)
         time = frame.time + self._shift
         if not math.isfinite(time) or (self._last is not None and time <= self._last):
-            begin = 0.0 if self._last is None else self._last + self._pause
+            begin = 0.0 if self._last is None else self._last + self._period
             self._reported = f"The clock of the source jumped from {self._last} s to {time} s."
             # A clock that was set stays so: later frames keep their time difference to this one.
             self._shift += begin - time if math.isfinite(time) else 0.0
@@ -44,6 +44,6 @@ class MonotonicFrames:
 
     def runtime_faults(self) -> Iterable[AlertCondition]:
         """One fault after each jump of the clock."""
-        said, self._reported = self._reported, None
-        if said:
-            yield AlertCondition(CLOCK_JUMPED, (), Severity.WARNING, said, key=NAME, needs=())
+        cause, self._reported = self._reported, None
+        if cause:
+            yield AlertCondition(CLOCK_JUMPED, (), Severity.WARNING, cause, key=NAME, needs=())

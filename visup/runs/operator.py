@@ -19,7 +19,7 @@ from visup.agent.model.errors import SettingsError, VisupError
 from visup.agent.model.step import Observer, Step
 from visup.agent.storage.text_file import read_text_file
 
-MOST_DIGITS = 18
+MAX_DIGITS = 18
 """Maximum number of digits of an object id."""
 
 
@@ -42,7 +42,7 @@ def parse_answers(lines: Iterable[str], where: str | None = None) -> dict[int, s
         if not text:
             continue
         number, equals, name = (part.strip() for part in text.partition("="))
-        if not (number.isdecimal() and len(number) <= MOST_DIGITS and equals and name):
+        if not (number.isdecimal() and len(number) <= MAX_DIGITS and equals and name):
             raise SettingsError(
                 f"the answer {text!r} cannot be read",
                 where=where,
@@ -75,10 +75,10 @@ def typed_lines() -> Callable[[], list[str]] | None:
             typed.put(line)
 
     Thread(target=read, name="operator", daemon=True).start()
-    return lambda: _taken(typed)
+    return lambda: _drained(typed)
 
 
-def _taken(queue: SimpleQueue[str]) -> list[str]:
+def _drained(queue: SimpleQueue[str]) -> list[str]:
     lines = []
     while True:
         try:
@@ -114,17 +114,17 @@ class HumanOperator:
         """
         for name in self.answers.values():
             resolve_model(agent.mind, name, agent.models, cast=agent.cast)
-        waiting = dict(self.answers)
+        pending = dict(self.answers)
 
-        def hand() -> None:
-            for number in [i for i in waiting if _known(agent.mind, i)]:
-                agent.answer(number, waiting.pop(number))
+        def pass_on() -> None:
+            for number in [i for i in pending if _known(agent.mind, i)]:
+                agent.answer(number, pending.pop(number))
 
         if at_once:
-            hand()
+            pass_on()
 
         def after(step: Step, frame: Frame) -> None:
-            hand()
+            pass_on()
             if self.typed is None:
                 return
             for event in step.events:
@@ -132,18 +132,18 @@ class HumanOperator:
                     name = event.data["names"][0]
                     self.tell(f"Type an answer such as {event.objects[0]}={name} at any time.")
             for line in self.typed():
-                self._take(agent, line, step.time)
+                self._process_line(agent, line, step.time)
 
         return after
 
-    def _take(self, agent: Agent, line: str, now: float) -> None:
+    def _process_line(self, agent: Agent, line: str, now: float) -> None:
         """Process a typed line: ID=NAME, or a name alone while one question is open.
 
         A name typed before the question could be read is no answer to it.
         """
-        waiting = [q for q in agent.mind.questions if q.asked < now]
-        if "=" not in line and line.strip() and len(waiting) == 1:
-            line = f"{waiting[0].object_id}={line}"
+        open_questions = [q for q in agent.mind.questions if q.asked < now]
+        if "=" not in line and line.strip() and len(open_questions) == 1:
+            line = f"{open_questions[0].object_id}={line}"
         try:
             for number, name in parse_answers([line]).items():
                 agent.answer(number, name)

@@ -33,10 +33,10 @@ if TYPE_CHECKING:
     from visup.report.records import RunData
     from visup.runs.result import RunResult
 
-MOST_WAITING = 1000
+MAX_WAITING_STEPS = 1000
 """Steps that wait while the journal cannot be written; beyond this number the oldest are lost."""
 
-TRY_AGAIN = 25
+RETRY_STEPS = 25
 """Steps between two retries."""
 
 
@@ -74,8 +74,8 @@ class Recorder:
         from visup.report.video import AnnotatedVideo
 
         self.folder = folder
-        keep = None if options.keep_gb is None else int(options.keep_gb * 1e9)
-        limits = JournalLimits(keep_bytes=keep, reserve_bytes=options.reserve_bytes)
+        keep_bytes = None if options.keep_gb is None else int(options.keep_gb * 1e9)
+        limits = JournalLimits(keep_bytes=keep_bytes, reserve_bytes=options.reserve_bytes)
         self.journal = Journal(folder / JOURNAL, limits, resume=resume)
         self.facts = {**_facts(settings, source), **RecordStamp(options.camera).named}
         if not resume:
@@ -90,8 +90,8 @@ class Recorder:
         self._derived = {"report": self.collector.add} if options.report else {}
         if self.video:
             self._derived["annotated video"] = self.video.add
-        self._waiting: deque[Step] = deque(maxlen=MOST_WAITING)
-        self._patience = 0
+        self._waiting: deque[Step] = deque(maxlen=MAX_WAITING_STEPS)
+        self._steps_to_retry = 0
         self._lost = 0
         self._clock: WallClock | None = None
         self._wall = WallClock()
@@ -99,10 +99,10 @@ class Recorder:
 
     def __call__(self, step: Step, frame: Frame) -> None:
         """Record one step."""
-        self._lost += len(self._waiting) == MOST_WAITING
+        self._lost += len(self._waiting) == MAX_WAITING_STEPS
         self._waiting.append(step)
-        self._patience -= 1
-        if self._patience <= 0:
+        self._steps_to_retry -= 1
+        if self._steps_to_retry <= 0:
             self._write()
         self._derive(step, frame, list(self._derived))
 
@@ -111,12 +111,12 @@ class Recorder:
         """Whether steps are waiting to be written."""
         return bool(self._waiting)
 
-    def keep_clock(self, clock: WallClock) -> None:
+    def record_clock(self, clock: WallClock) -> None:
         """Record the wall clock with the next step."""
         self._clock = self._wall = clock
         self.facts["began"] = clock.text(0.0)
 
-    def begin_anew(self) -> None:
+    def restart_report(self) -> None:
         """Clear the data for the report, since all steps will be processed again."""
         from visup.report.collector import Collector
 
@@ -160,8 +160,10 @@ class Recorder:
             self.video.close()
         self._write()
         if self._waiting:
-            left = f"{len(self._waiting) + self._lost} steps could not be recorded: {self._fault}"
-            self.notes = (*self.notes, left)
+            unwritten = (
+                f"{len(self._waiting) + self._lost} steps could not be recorded: {self._fault}"
+            )
+            self.notes = (*self.notes, unwritten)
             self.complete = False
         report = None
         try:
@@ -180,7 +182,7 @@ class Recorder:
         return report, self.notes
 
     def _write(self) -> None:
-        self._patience = TRY_AGAIN if self._fault else 0
+        self._steps_to_retry = RETRY_STEPS if self._fault else 0
         try:
             if self._clock:
                 self.journal.note(clock=self._clock.anchors)
@@ -188,9 +190,9 @@ class Recorder:
             while self._waiting:
                 self.journal.record(self._waiting[0])
                 self._waiting.popleft()
-            self._fault, self._patience = "", 0
+            self._fault, self._steps_to_retry = "", 0
         except OutputError as fault:
-            self._fault, self._patience = fault.what, TRY_AGAIN
+            self._fault, self._steps_to_retry = fault.what, RETRY_STEPS
 
     def _derive(self, step: Step, frame: Frame, names: Iterable[str]) -> None:
         for name in names:
@@ -201,8 +203,8 @@ class Recorder:
                 # Derived files may be lost; supervision and the journal go on.
                 del self._derived[name]
                 self.complete &= name != "report"
-                said = f"the {name} stops at {step.time:.1f} s: {type(fault).__name__}: {fault}"
-                self.notes = (*self.notes, said)
+                note = f"the {name} stops at {step.time:.1f} s: {type(fault).__name__}: {fault}"
+                self.notes = (*self.notes, note)
 
     def _report(self, result: RunResult) -> Path | None:
         from visup.report.page.html import write_report
@@ -240,7 +242,7 @@ class Recorder:
 
 def _facts(settings: WatchSettings, source: VideoSource) -> dict[str, Any]:
     """The facts recorded at the beginning of a run."""
-    left_out = {SOURCE_REDACTED: True} if has_secret(settings.source) else {}
+    redaction = {SOURCE_REDACTED: True} if has_secret(settings.source) else {}
     return {
         "visup": __version__,
         "source": source.name,
@@ -248,7 +250,7 @@ def _facts(settings: WatchSettings, source: VideoSource) -> dict[str, Any]:
         "size": source.size,
         "live": source.live,
         "settings": to_jsonable(replace(settings, source=redacted(settings.source))),
-        **left_out,
+        **redaction,
     }
 
 

@@ -105,19 +105,19 @@ def changed_settings(settings: WatchSettings, **changed: Any) -> WatchSettings:
 
     If tasks are changed but actors are not, bindings of actors that the new tasks lack are dropped.
     """
-    wanted = {k: v for k, v in changed.items() if v}
-    if "tasks" in wanted and "actors" not in wanted:
-        tasks = [t for name in wanted["tasks"] for t in load_tasks(name)]
+    changes = {k: v for k, v in changed.items() if v}
+    if "tasks" in changes and "actors" not in changes:
+        tasks = [t for name in changes["tasks"] for t in load_tasks(name)]
         known = {a for task in tasks for a in (*task_actors(task), *spare_kinds(task))}
-        wanted["actors"] = {a: m for a, m in settings.actors.items() if a in known}
-    return replace(settings, **wanted)
+        changes["actors"] = {a: m for a, m in settings.actors.items() if a in known}
+    return replace(settings, **changes)
 
 
 def replay(
     recording: Recording,
     settings: WatchSettings,
     out: Path | None = None,
-    tell: Callable[[Step], None] | None = None,
+    on_step: Callable[[Step], None] | None = None,
 ) -> Transcript:
     """Replay the reasoning of a run.
 
@@ -125,7 +125,7 @@ def replay(
         recording: The recorded run.
         settings: Tasks, rules and actors to reason with.
         out: A new run folder for a journal and `events.jsonl`, or None.
-        tell: Receives each step.
+        on_step: Receives each step.
 
     Returns:
         The transcript.
@@ -139,16 +139,16 @@ def replay(
         journal = _journal(recording, settings, out, stack) if out else None
         answers = recording.answers()
         begin = time.perf_counter()
-        for seen in recording.observations():
-            step = agent.reason(seen, answers.get(seen.frame_index, {}))
+        for observation in recording.observations():
+            step = agent.reason(observation, answers.get(observation.frame_index, {}))
             if journal:
                 journal.record(step)
             listener(step)
-            if tell:
-                tell(step)
+            if on_step:
+                on_step(step)
         seconds = time.perf_counter() - begin
-        of_run = final_verdict(agent.mind) if agent.mind.tasks else listener.alarms
-        verdict = of_run.value if of_run else None
+        result = final_verdict(agent.mind) if agent.mind.tasks else listener.alarms
+        verdict = result.value if result else None
         if journal:
             journal.note(verdict=verdict, steps=listener.steps, tasks=agent.mind.tasks)
             export_events(journal.path, journal.path.with_name("events.jsonl"))
@@ -160,8 +160,8 @@ def replay(
 def recorded_transcript(recording: Recording) -> Transcript:
     """The events of a recorded run."""
     verdict = recording.facts().get("verdict")
-    told = verdict if isinstance(verdict, str) else None
-    return Transcript(tuple(recording.events()), told, recording.count())
+    verdict_text = verdict if isinstance(verdict, str) else None
+    return Transcript(tuple(recording.events()), verdict_text, recording.count())
 
 
 def transcript_diff(first: Transcript, second: Transcript) -> TranscriptDiff:
@@ -174,8 +174,8 @@ def transcript_diff(first: Transcript, second: Transcript) -> TranscriptDiff:
     b = [event_text(e) for e in second.events]
     gone: list[Line] = []
     new: list[Line] = []
-    for what, i0, i1, j0, j1 in SequenceMatcher(None, a, b, autojunk=False).get_opcodes():
-        if what != "equal":
+    for operation, i0, i1, j0, j1 in SequenceMatcher(None, a, b, autojunk=False).get_opcodes():
+        if operation != "equal":
             gone += first.events[i0:i1]
             new += second.events[j0:j1]
     return TranscriptDiff(tuple(gone), tuple(new), (first.verdict, second.verdict))
@@ -196,8 +196,11 @@ def _count(events: Sequence[Line], group: str) -> int:
 def _journal(recording: Recording, settings: WatchSettings, out: Path, stack: ExitStack) -> Journal:
     journal = Journal(out / JOURNAL)
     stack.callback(journal.close)
-    kept = {k: v for k, v in recording.facts().items() if k in ("source", "fps", "size")}
+    source_facts = {k: v for k, v in recording.facts().items() if k in ("source", "fps", "size")}
     journal.note(
-        **kept, visup=__version__, settings=to_jsonable(settings), replayed=str(recording.path)
+        **source_facts,
+        visup=__version__,
+        settings=to_jsonable(settings),
+        replayed=str(recording.path),
     )
     return journal

@@ -35,16 +35,16 @@ class ReplayReport:
     """
 
     def __init__(self, recording: Recording, settings: WatchSettings) -> None:
-        kept = {
+        source_facts = {
             k: v for k, v in recording.facts().items() if k in ("source", "fps", "size", "live")
         }
-        told = {"visup": __version__, "settings": to_jsonable(settings)}
-        self._facts = {**kept, **told, "replayed": str(recording.path)}
+        replay_facts = {"visup": __version__, "settings": to_jsonable(settings)}
+        self._facts = {**source_facts, **replay_facts, "replayed": str(recording.path)}
         self._settings = settings
         self._collector = Collector()
         self._stack = ExitStack()
         self._frames: Iterator[Frame] = iter(())
-        self._waiting: Frame | None = None
+        self._next_frame: Frame | None = None
         self.notes: tuple[str, ...] = ()
 
     def __enter__(self) -> Self:
@@ -52,10 +52,10 @@ class ReplayReport:
         if path.exists() and not path.is_char_device():
             try:
                 self._frames = iter(self._stack.enter_context(open_video(self._settings)))
-                self._waiting = next(self._frames, None)
+                self._next_frame = next(self._frames, None)
             except VisupError:
-                self._waiting = None
-        if self._waiting is None:
+                self._next_frame = None
+        if self._next_frame is None:
             self.notes = ("The video is no longer available: pictures show outlines only.",)
         return self
 
@@ -99,11 +99,11 @@ class ReplayReport:
 
     def _frame(self, step: Step) -> Frame:
         """The frame of a step, or a grey one."""
-        while self._waiting is not None and self._waiting.index < step.frame_index:
-            self._waiting = next(self._frames, None)
+        while self._next_frame is not None and self._next_frame.index < step.frame_index:
+            self._next_frame = next(self._frames, None)
         width, height = step.mind.frame_size
-        found = self._waiting
-        if found is not None and found.index == step.frame_index and found.size == (width, height):
-            return Frame(step.frame_index, step.time, found.image)
+        frame = self._next_frame
+        if frame is not None and frame.index == step.frame_index and frame.size == (width, height):
+            return Frame(step.frame_index, step.time, frame.image)
         image = np.full((height, width, 3), GREY, np.uint8)
         return Frame(step.frame_index, step.time, image)

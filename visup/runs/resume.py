@@ -108,9 +108,9 @@ def interrupted_run(
             hint=f"visup replay {run}",
         )
     state, why_none = read_checkpoint(recording.path.parent)
-    ends = recording.first_and_last()
+    recorded_range = recording.first_and_last()
     continues = facts.get("continues") is not None
-    if state is not None and not _belongs(state, ends, continues=continues):
+    if state is not None and not _belongs(state, recorded_range, continues=continues):
         state, why_none = None, "its checkpoint does not belong to this journal"
     if state is None and (facts.get("steps_dropped") or continues):
         raise OutputError(
@@ -125,12 +125,12 @@ def interrupted_run(
     return InterruptedRun(recording, settings, state, why_none, recording.count(), verdict, answers)
 
 
-def _belongs(state: Checkpoint, ends: tuple[int, int] | None, *, continues: bool) -> bool:
+def _belongs(state: Checkpoint, recorded_range: tuple[int, int] | None, *, continues: bool) -> bool:
     """Whether a state belongs to a recorded step, or to the run that this one continues."""
-    if ends is None:
+    if recorded_range is None:
         return continues
-    return ends[0] - 1 <= state.frame_index <= ends[1] or (
-        continues and state.frame_index < ends[0]
+    return recorded_range[0] - 1 <= state.frame_index <= recorded_range[1] or (
+        continues and state.frame_index < recorded_range[0]
     )
 
 
@@ -138,19 +138,19 @@ def _with_named_code(
     recorded: WatchSettings, run: Path, behaviours: Collection[Path | str], plugins: Collection[str]
 ) -> WatchSettings:
     """The settings of a run with the code named by the user, which must match."""
-    had = sorted(map(_code_name, recorded.behaviours)), sorted(recorded.plugins)
-    if had != (sorted(map(_code_name, behaviours)), sorted(plugins)):
+    recorded_names = sorted(map(_code_name, recorded.behaviours)), sorted(recorded.plugins)
+    if recorded_names != (sorted(map(_code_name, behaviours)), sorted(plugins)):
         behaviour = [w for where in recorded.behaviours for w in ("--behaviour", str(where))]
-        wanted = [*behaviour, *(w for name in recorded.plugins for w in ("--plugin", name))]
+        options = [*behaviour, *(w for name in recorded.plugins for w in ("--plugin", name))]
         # Quoted: text from a folder must not become commands when the hint is pasted.
-        again = shlex.join(["visup", "watch", "--resume", str(run), *wanted])
+        again = shlex.join(["visup", "watch", "--resume", str(run), *options])
         raise SettingsError(
             "this run used custom behaviours, which are code; code is never run from a run folder"
-            if wanted
+            if options
             else "this run used no custom behaviours",
             where=str(run),
-            expected=shlex.join(wanted) or "neither --behaviour nor --plugin",
-            hint=f"if you trust them, name them again: {again}" if wanted else None,
+            expected=shlex.join(options) or "neither --behaviour nor --plugin",
+            hint=f"if you trust them, name them again: {again}" if options else None,
         )
     return replace(recorded, behaviours=tuple(behaviours), plugins=tuple(plugins))
 
@@ -189,8 +189,8 @@ def _is_grave(event: Mapping[str, Any]) -> bool:
 def _kind(event: Mapping[str, Any]) -> str:
     """The kind of a recorded event; the journal is untrusted."""
     data = event.get("data")
-    said = data.get("alert_kind") if isinstance(data, dict) else None
-    return str(said or event.get("kind"))
+    alert_kind = data.get("alert_kind") if isinstance(data, dict) else None
+    return str(alert_kind or event.get("kind"))
 
 
 def _answers(facts: Mapping[str, Any], where: str) -> Mapping[int, str]:
@@ -219,18 +219,18 @@ def recorded_settings(facts: Mapping[str, Any], where: str) -> WatchSettings:
     try:
         return _settings_form().validate_python(facts.get("settings"))
     except ValidationError as fault:
-        said = fault.errors()[0]["msg"]
-        raise OutputError(f"the run's settings cannot be read ({said})", where=where) from fault
+        message = fault.errors()[0]["msg"]
+        raise OutputError(f"the run's settings cannot be read ({message})", where=where) from fault
 
 
 def catch_up(
     agent: Agent,
     source: VideoSource,
     past: InterruptedRun,
-    tell: Callable[[Step, Frame], None],
-    late: Callable[[Step], None],
+    on_step: Callable[[Step, Frame], None],
+    on_recorded_step: Callable[[Step], None],
     *,
-    whole: bool,
+    behaviours_restored: bool,
 ) -> tuple[Iterator[Frame], tuple[str, ...]]:
     """Bring an agent to its state after the last recorded step.
 
@@ -238,9 +238,9 @@ def catch_up(
         agent: Agent with the run's settings; new, or restored from a state.
         source: The source, just opened.
         past: The run.
-        tell: Receives recorded steps whose frames exist.
-        late: Receives all recorded steps since the state.
-        whole: Whether the behaviours were restored, too.
+        on_step: Receives recorded steps whose frames exist.
+        on_recorded_step: Receives all recorded steps since the state.
+        behaviours_restored: Whether the behaviours were restored, too.
 
     Returns:
         The frames that follow, and notes for the user.
@@ -250,21 +250,23 @@ def catch_up(
     """
     after = past.state.frame_index if past.state else -1
     if source.live:
-        return _live(agent, source, past, late, after), ("Nothing was seen in between.",)
+        return _live(agent, source, past, on_recorded_step, after), (
+            "Nothing was seen in between.",
+        )
     answers = past.recording.answers()
     differing = 0
     frames: Iterator[Frame] = iter(source)
-    for seen in past.recording.observations(after):
-        frame = _frame(frames, seen, source)
-        again = agent.perceive(frame)
-        differing += pack_observation(_without_runtime_faults(again)) != pack_observation(
-            _without_runtime_faults(seen)
+    for observation in past.recording.observations(after):
+        frame = _frame(frames, observation, source)
+        perceived = agent.perceive(frame)
+        differing += pack_observation(_without_runtime_faults(perceived)) != pack_observation(
+            _without_runtime_faults(observation)
         )
-        step = agent.reason(seen, answers.get(seen.frame_index, {}))
-        tell(step, frame)
-        late(step)
+        step = agent.reason(observation, answers.get(observation.frame_index, {}))
+        on_step(step, frame)
+        on_recorded_step(step)
     notes = []
-    if not whole and past.steps:
+    if not behaviours_restored and past.steps:
         why = f" ({past.why_none})" if past.why_none else ""
         notes.append(f"All {past.steps} earlier frames were perceived again{why}.")
     if differing:
@@ -303,13 +305,13 @@ def _live(
     agent: Agent,
     source: VideoSource,
     past: InterruptedRun,
-    late: Callable[[Step], None],
+    on_recorded_step: Callable[[Step], None],
     after: int,
 ) -> Iterator[Frame]:
     """Frames of a camera, with numbers and times continued from the last recorded one."""
     answers = past.recording.answers()
     for last in past.recording.observations(after):
-        late(agent.reason(last, answers.get(last.frame_index, {})))
+        on_recorded_step(agent.reason(last, answers.get(last.frame_index, {})))
         for behaviour in agent.behaviours:
             if missed := getattr(behaviour, "missed", None):
                 missed(last)
@@ -317,7 +319,10 @@ def _live(
     if first is None:
         return iter(())
     # Only the gap is measured by the wall clock, since it may have been set meanwhile.
-    away = max(1.0 / source.fps, time.time() - past.recording.written())
-    later = agent.mind.time + away - first.time
-    on = agent.mind.frame_index + 1
-    return (Frame(f.index + on, f.time + later, f.image) for f in chain((first,), source))
+    gap_s = max(1.0 / source.fps, time.time() - past.recording.written())
+    time_offset = agent.mind.time + gap_s - first.time
+    index_offset = agent.mind.frame_index + 1
+    return (
+        Frame(f.index + index_offset, f.time + time_offset, f.image)
+        for f in chain((first,), source)
+    )

@@ -20,7 +20,7 @@ from visup.runs.checkpoints import CheckpointWriter
 from visup.runs.evidence.keeper import EvidenceKeeper
 from visup.runs.inputs.answer_box import AnswerBox
 from visup.runs.inputs.audience import Audience, RunFigures, RunProgress
-from visup.runs.inputs.preflight import check_cast, told_of_actors
+from visup.runs.inputs.preflight import check_cast, taught_actor_notes
 from visup.runs.inputs.run_folder import discard_unbegun, fresh_folder
 from visup.runs.inputs.run_sinks import sinks_of
 from visup.runs.inputs.stop_signals import stop_signals
@@ -39,7 +39,7 @@ from visup.version import __version__
 if TYPE_CHECKING:
     from visup.runs.operator import HumanOperator
 
-BOOKS_S = 2.0
+CLOSE_JOURNALS_S = 2.0
 """Time to finish the files of earlier runs when the last one ends, seconds."""
 
 __all__ = ["Audience", "RunProgress", "fresh_folder", "notify", "supervise", "supervised"]
@@ -110,7 +110,7 @@ def _supervised(
     """Yields None once everything is open, then the steps."""
     with ExitStack() as stack:
         answered = audience.operator is not None and bool(audience.operator.answers)
-        run = _Run(settings, folder, options, past, stack, answered=answered)
+        run = _SupervisedRun(settings, folder, options, past, stack, answered=answered)
         run.keep_evidence()
         frames = run.catch_up(past) if past else run.source
         run.connect(audience, past)
@@ -120,7 +120,7 @@ def _supervised(
         return run.result()
 
 
-class _Run:
+class _SupervisedRun:
     """A run from its first frame to its result; its resources are closed with `stack`."""
 
     def __init__(
@@ -136,17 +136,17 @@ class _Run:
         self._faults = RuntimeFaults()
         self._meter, self._roll_over = PhaseMeter(), RollOver(options)
         self.source = stack.enter_context(open_video(settings, options.span))
-        self._agent = build_agent(settings, also=(self._faults,), live=self.source.live)
+        self._agent = build_agent(settings, more_behaviours=(self._faults,), live=self.source.live)
         stack.callback(self._agent.close)
         self._warnings = () if past else check_cast(settings, self._agent, answered=answered)
         # The bound actors are recorded, so that a replay, which has no models, knows them.
         actors = self._agent.mind.actors
-        self._notes = told_of_actors(settings.actors, actors)
+        self._notes = taught_actor_notes(settings.actors, actors)
         settings = replace(settings, actors=dict(actors))
         self._settings, self._folder, self._stack = settings, folder, stack
         # Before the journal, so that a refused run leaves nothing behind.
-        told = past.recording.facts().get("clock") if past else None
-        self._stamp = RecordStamp(options.camera, WallClock.read(told), live=self.source.live)
+        clock = past.recording.facts().get("clock") if past else None
+        self._stamp = RecordStamp(options.camera, WallClock.read(clock), live=self.source.live)
         written = past.recording.written() if past else None
         self._sinks = sinks_of(options, settings.source, self._stamp, written)
         stack.callback(self._sinks.close)
@@ -169,16 +169,23 @@ class _Run:
         return Recorder(self._settings, self.source, folder, options, resume=resume)
 
     def _close_journals(self) -> None:
-        self._roll_over.wait(BOOKS_S)
+        self._roll_over.wait(CLOSE_JOURNALS_S)
         if self._recorder:
             self._recorder.close()
 
     def catch_up(self, past: InterruptedRun) -> Iterator[Frame]:
         """Restore the agent, and return the remaining frames."""
-        past, whole = self._load_state(past)
-        tell = self._recorder.catch_up if self._recorder else lambda step, frame: None
-        late = self._sinks.alerts.late
-        frames, notes = catch_up(self._agent, self.source, past, tell, late, whole=whole)
+        past, behaviours_restored = self._load_state(past)
+        on_step = self._recorder.catch_up if self._recorder else lambda step, frame: None
+        on_recorded_step = self._sinks.alerts.late
+        frames, notes = catch_up(
+            self._agent,
+            self.source,
+            past,
+            on_step,
+            on_recorded_step,
+            behaviours_restored=behaviours_restored,
+        )
         self._notes = (*self._notes, *notes)
         return frames
 
@@ -192,34 +199,38 @@ class _Run:
             return past, False
         try:
             if self._recorder:
-                self._recorder.collector.load(past.state.kept)
+                self._recorder.collector.load(past.state.recorder)
             return past, self._agent.load(past.state.agent)
         except Exception as fault:
             self._agent.close()
-            self._agent = build_agent(self._settings, also=(self._faults,), live=self.source.live)
+            self._agent = build_agent(
+                self._settings, more_behaviours=(self._faults,), live=self.source.live
+            )
             self._stack.callback(self._agent.close)
             if self._recorder:
-                self._recorder.begin_anew()
+                self._recorder.restart_report()
             why = f"its checkpoint is of another form than visup {__version__} has: {error_line(fault)}"
             return replace(past, state=None, why_none=why), False
 
     def connect(self, audience: Audience, past: InterruptedRun | None) -> None:
         """Connect the observers, and the sources of runtime faults."""
         if self._recorder:
-            self._stamp.changed = self._recorder.keep_clock
+            self._stamp.changed = self._recorder.record_clock
             if self._stamp.clock.anchors:
-                self._recorder.keep_clock(self._stamp.clock)
+                self._recorder.record_clock(self._stamp.clock)
         # The journal comes first, so that everything reported is recorded.
         recording = (self._recorder,) if self._recorder else ()
         answering = (self._attending(audience.operator, past),) if audience.operator else ()
         # Evidence comes before the sinks, which link to it.
-        kept = (self._evidence,) if self._evidence else ()
-        box = (AnswerBox(self._agent, lambda: self._folder, audience.notice),) if recording else ()
-        others = (*audience.observers, *kept, self._sinks, *answering, *box)
+        evidence = (self._evidence,) if self._evidence else ()
+        answer_box = (
+            (AnswerBox(self._agent, lambda: self._folder, audience.notice),) if recording else ()
+        )
+        after_recording = (*audience.observers, *evidence, self._sinks, *answering, *answer_box)
         clocked = (self._stamp,) if self.source.live else ()
-        self._agent.observers = (self._alarms, *clocked, *recording, *others)
+        self._agent.observers = (self._alarms, *clocked, *recording, *after_recording)
         for warning in self._warnings:
-            self._warn(warning, audience.notice)
+            self._issue_warning(warning, audience.notice)
         if self._recorder:
             self._faults.add_source(
                 lambda: self._recorder.runtime_faults() if self._recorder else ()
@@ -232,16 +243,16 @@ class _Run:
     def keep_evidence(self) -> None:
         """Save evidence of alerts, if requested."""
         self._evidence: EvidenceKeeper | None = None
-        wanted = self._options.evidence
-        if wanted is None or self._folder is None:
+        options = self._options.evidence
+        if options is None or self._folder is None:
             return
         fps = self.source.fps / self.source.every
-        keeper = self._evidence = EvidenceKeeper(self._folder, wanted, fps, self._stamp)
+        keeper = self._evidence = EvidenceKeeper(self._folder, options, fps, self._stamp)
         self._stack.callback(keeper.close, self._options.closing_s)
         self._faults.add_source(keeper.runtime_faults)
         self._sinks.alerts.links = keeper.links
 
-    def _warn(self, text: str, notice: Callable[[str], None] | None) -> None:
+    def _issue_warning(self, text: str, notice: Callable[[str], None] | None) -> None:
         """Issue a warning before the first frame; without an audience it is added to the notes."""
         if notice:
             notice(text)
@@ -292,16 +303,16 @@ class _Run:
             return
         mind, before = self._agent.mind, self._checkpoints
         verdict = final_verdict(mind) if mind.tasks else self._alarms.verdict
-        said = RunResult(verdict, self._steps, has_task=bool(mind.tasks), seconds=step.time)
+        result = RunResult(verdict, self._steps, has_task=bool(mind.tasks), seconds=step.time)
         self._agent.observers = [new if o is old else o for o in self._agent.observers]
         self._recorder, self._checkpoints, self._folder = new, checkpoints, new.folder
-        self._stamp.changed = new.keep_clock
+        self._stamp.changed = new.record_clock
         if self._evidence:
             self._evidence.move_to(new.folder)
         self._steps, self._alarms.verdict = 0, None
         self._roll_over.begun(step.time)
         assert before
-        self._roll_over.close_books(old, before, said, mind.tasks)
+        self._roll_over.finish_files(old, before, result, mind.tasks)
 
     def _next_recorder(
         self, step: Step, old: Recorder, places: RunPlaces
@@ -347,14 +358,14 @@ class _Run:
         mind = self._agent.mind
         verdict = final_verdict(mind) if mind.tasks else self._alarms.verdict
         problem = "stopped by the user" if self._stopped else self.source.problem
-        told = (
+        late_notes = (
             cache_note(),
             self._checkpoints.note if self._checkpoints else None,
             self._pace.note() if self._pace else None,
             *closing_notes(mind, self._settings.at_end),
             *self._sinks.end(verdict, self._steps),
         )
-        notes = (*self._notes, *filter(None, told))
+        notes = (*self._notes, *filter(None, late_notes))
         result = RunResult(
             verdict,
             self._steps,
@@ -368,12 +379,12 @@ class _Run:
         if self._recorder is None:
             return result
         ended = self.source.ended.value if self.source.ended and not self._stopped else "stopped"
-        report, more = self._recorder.finish(result, ended, mind.tasks)
+        report, report_notes = self._recorder.finish(result, ended, mind.tasks)
         return replace(
             result,
             folder=self._folder,
             report=report,
-            notes=(*notes, *more),
+            notes=(*notes, *report_notes),
             recorded=self._recorder.complete,
         )
 
@@ -381,19 +392,19 @@ class _Run:
         """The operator, without answers already applied before the run was killed."""
         if self._recorder and not past:
             self._recorder.journal.note(answers=operator.answers)
-        given = {**past.answers, **operator.answers} if past else operator.answers
-        taken = self._agent.mind.answers
-        waiting = {i: name for i, name in given.items() if i not in taken}
-        attend = replace(operator, answers=waiting)
-        return attend.attend(self._agent, at_once=past is not None)
+        answers = {**past.answers, **operator.answers} if past else operator.answers
+        applied = self._agent.mind.answers
+        pending = {i: name for i, name in answers.items() if i not in applied}
+        pending_operator = replace(operator, answers=pending)
+        return pending_operator.attend(self._agent, at_once=past is not None)
 
 
 def notify(sinks: Sinks, notice: Callable[[str], None] | None) -> Callable[[str], None]:
     """A function that passes a sentence to sinks and to `notice` at once."""
 
-    def tell(text: str) -> None:
+    def pass_on(text: str) -> None:
         sinks.notice(text)
         if notice:
             notice(text)
 
-    return tell
+    return pass_on

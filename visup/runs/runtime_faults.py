@@ -39,8 +39,8 @@ class RuntimeFaults(Stateless):
         self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
         """One percept of kind 'trouble' for each present fault."""
-        now = [concern for source in self._sources for concern in source()]
-        return [Percept(RUNTIME_FAULT, c, frame.time, self.contract.name) for c in now]
+        conditions = [condition for source in self._sources for condition in source()]
+        return [Percept(RUNTIME_FAULT, c, frame.time, self.contract.name) for c in conditions]
 
 
 def runtime_fault_reasoner(mind: Mind, observation: Observation) -> Outcome:

@@ -15,7 +15,7 @@ from visup.agent.model.errors import SettingsError
 
 VIEWS_AT_END = ("unknown", "weak", "strong")
 """How rules that are undecided when a run ends may count; as in `visup.rules`."""
-LARGEST_EVIDENCE = 20.0
+MAX_EVIDENCE = 20.0
 """With this weight a single vote decides an identity."""
 SOURCE_REDACTED = "source_without_secret"
 """Key of a recorded run that says its source had a password, which was not recorded."""
@@ -42,21 +42,21 @@ class Option:
     complete: Callable[[str], list[str]] | None = None
 
 
-def complete_task(begun: str) -> list[str]:
+def complete_task(prefix: str) -> list[str]:
     """Shipped tasks and task files that complete a word."""
     from visup.tasks import shipped_tasks
 
-    place = Path(begun)
-    folder, start = (place, "") if begun.endswith("/") else (place.parent, place.name)
+    path = Path(prefix)
+    folder, start = (path, "") if prefix.endswith("/") else (path.parent, path.name)
     files = sorted(folder.glob(f"{start}*.task")) if folder.is_dir() else []
-    return [*(t for t in shipped_tasks() if t.startswith(begun)), *map(str, files)]
+    return [*(t for t in shipped_tasks() if t.startswith(prefix)), *map(str, files)]
 
 
-def complete_preset(begun: str) -> list[str]:
+def complete_preset(prefix: str) -> list[str]:
     """Presets that complete a word."""
     from visup.runs.inputs.presets import PRESETS
 
-    return [name for name in PRESETS if name.startswith(begun)]
+    return [name for name in PRESETS if name.startswith(prefix)]
 
 
 def parse_actors(bindings: Iterable[str]) -> dict[str, tuple[str, ...]]:
@@ -242,11 +242,11 @@ class WatchSettings:
                 "nothing would supply regions: --no-motion needs another behaviour that does",
                 hint="add --behaviour FILE, --plugin NAME or --detections FILE",
             )
-        told = self.vote_evidence
-        if told is not None and not 0 < told <= LARGEST_EVIDENCE:
+        evidence = self.vote_evidence
+        if evidence is not None and not 0 < evidence <= MAX_EVIDENCE:
             raise SettingsError(
-                f"`evidence` of identities is {told}",
-                expected=f"more than 0, at most {LARGEST_EVIDENCE}",
+                f"`evidence` of identities is {evidence}",
+                expected=f"more than 0, at most {MAX_EVIDENCE}",
             )
         fov = self.fov_vertical_deg
         if fov is not None and not 0 < fov < 180:

@@ -102,7 +102,7 @@ def _every(settings: WatchSettings, fps: float) -> int:
 def build_agent(
     settings: WatchSettings,
     observers: Sequence[Observer] = (),
-    also: Sequence[Behaviour] = (),
+    more_behaviours: Sequence[Behaviour] = (),
     *,
     live: bool = False,
 ) -> Agent:
@@ -111,7 +111,7 @@ def build_agent(
     Args:
         settings: Settings of the run.
         observers: Receive each step.
-        also: Behaviours besides those of the settings.
+        more_behaviours: Behaviours besides those of the settings.
         live: Whether the source is live, so that a hanging behaviour must be reported soon.
 
     Raises:
@@ -121,20 +121,23 @@ def build_agent(
     tasks, zones = _tasks_and_zones(settings)
     database = ModelDatabase.open(settings.models) if settings.models else None
     _check_actors(settings, tasks, database)
-    known, taught = _names(database)
+    model_names, taught = _names(database)
     boxes = _detector(settings)
-    known = (*known, *(n for n in (boxes.names if boxes else ()) if n not in known))
-    actors = with_taught_actors(tasks, settings.actors, known, taught)
+    model_names = (
+        *model_names,
+        *(n for n in (boxes.names if boxes else ()) if n not in model_names),
+    )
+    actors = with_taught_actors(tasks, settings.actors, model_names, taught)
     behaviours = [
         *_behaviours(
             settings, database, boxes, declared_sizes(tasks, actors), _initial_positions(tasks)
         ),
         *([ColourBehaviour()] if any(map(asks_for_colour, tasks)) else []),
-        *(told := signal_behaviours(settings.signals)),
-        *also,
+        *(signals := signal_behaviours(settings.signals)),
+        *more_behaviours,
     ]
     contracts = [b.contract for b in behaviours]
-    check_signals(contracts, told, _rules(settings), tasks)
+    check_signals(contracts, signals, _rules(settings), tasks)
     return Agent(
         behaviours=behaviours,
         reasoners=_reasoners(settings, tasks, contracts),
@@ -142,7 +145,7 @@ def build_agent(
         zones=zones,
         cast={**_cast(tasks), **actors},
         observers=observers,
-        models=known,
+        models=model_names,
         limits=replace(
             _limits(settings, live), never_asleep=always_active(contracts, _rules(settings))
         ),
@@ -219,8 +222,8 @@ def final_verdict(mind: Mind) -> Verdict:
     """
     if mind.tasks:
         verdicts = [finish(t) for t in mind.tasks]
-        seen = [v for v in verdicts if v is not Verdict.UNKNOWN]
-        return max(seen or verdicts, key=_GRAVITY.index)
+        observed = [v for v in verdicts if v is not Verdict.UNKNOWN]
+        return max(observed or verdicts, key=_BY_SEVERITY.index)
     return verdict_without_task(grave_kinds(mind.alerts)) or Verdict.SUCCEEDED
 
 
@@ -231,21 +234,21 @@ def closing_notes(mind: Mind, at_end: AtEnd | str) -> tuple[str, ...]:
         mind: The mind after the last step.
         at_end: How rules that are still undecided count; see `open_rules`.
     """
-    return (*map(str, open_rules(mind, at_end)), *_unfound(mind.tasks))
+    return (*map(str, open_rules(mind, at_end)), *_missing_actors(mind.tasks))
 
 
-def _unfound(tasks: Iterable[TaskBelief]) -> Iterator[str]:
+def _missing_actors(tasks: Iterable[TaskBelief]) -> Iterator[str]:
     for task in tasks:
         missing = [f"the {b.actor}" for b in task.bindings if b.object_id is None]
         if task.verdict is Verdict.UNKNOWN and missing:
             what = f"Task '{task.task}': nothing was found that is {either(missing)}."
-            yield f"{what} {NEVER_MOVES}"
+            yield f"{what} {UNSEEN_AT_REST}"
 
 
-NEVER_MOVES = (
+UNSEEN_AT_REST = (
     "What never moves is seen only if it was taught, or if its actor is declared with its place."
 )
-_GRAVITY = (
+_BY_SEVERITY = (
     Verdict.SUCCEEDED,
     Verdict.IN_PROGRESS,
     Verdict.UNKNOWN,
@@ -273,8 +276,8 @@ class VerdictMonitor:
 
 
 def _limits(settings: WatchSettings, live: bool) -> Limits:
-    usual = Limits(budgets=settings.budgets, isolate=frozenset(settings.isolate))
-    return replace(usual, hang_s=LIVE_HANG_S, longer_hangs=False) if live else usual
+    limits = Limits(budgets=settings.budgets, isolate=frozenset(settings.isolate))
+    return replace(limits, hang_s=LIVE_HANG_S, longer_hangs=False) if live else limits
 
 
 def _behaviours(
@@ -285,15 +288,15 @@ def _behaviours(
     places: Mapping[str, tuple[float, float]],
 ) -> list[Behaviour]:
     taught = database.taught if database is not None else ()
-    eyes = PausingMotionBehaviour(settings.rest_s) if settings.rest_s else MotionBehaviour()
-    moving: Behaviour = AppearanceBehaviour(taught) if taught else eyes
+    segmenter = PausingMotionBehaviour(settings.rest_s) if settings.rest_s else MotionBehaviour()
+    motion: Behaviour = AppearanceBehaviour(taught) if taught else segmenter
     if places:
-        moving = PlacedObjectBehaviour(places, taught)
+        motion = PlacedObjectBehaviour(places, taught)
     if boxes:
         return [HealthBehaviour(), boxes, *user_behaviours(settings)]
     if not settings.motion:
         return [HealthBehaviour(), *user_behaviours(settings)]
-    seeing: list[Behaviour] = [HealthBehaviour(), moving]
+    seeing: list[Behaviour] = [HealthBehaviour(), motion]
     if database is not None:
         seeing += [
             ShapeBehaviour(database),
@@ -314,33 +317,37 @@ def _initial_positions(tasks: Sequence[Task]) -> dict[str, tuple[float, float]]:
 
 
 def _rules(settings: WatchSettings) -> tuple[Rule, ...]:
-    own = tuple(r for path in settings.rules for r in load_rules(path))
-    without = preset_named(settings.preset).without if settings.preset else ()
-    return own or tuple(r for r in shipped_rules() if r.name not in without)
+    given = tuple(r for path in settings.rules for r in load_rules(path))
+    left_out = preset_named(settings.preset).without if settings.preset else ()
+    return given or tuple(r for r in shipped_rules() if r.name not in left_out)
 
 
 def _reasoners(
     settings: WatchSettings, tasks: Sequence[Task], contracts: Sequence[Contract] = ()
 ) -> Reasoners:
     traits = any(map(asks_for_traits, tasks))
-    usual = ReasonerSettings()
+    reasoner_settings = ReasonerSettings()
     if settings.preset:
-        usual = ReasonerSettings(objects=preset_named(settings.preset).objects)
+        reasoner_settings = ReasonerSettings(objects=preset_named(settings.preset).objects)
     if settings.vote_evidence is not None:
-        usual = replace(usual, votes=VoteSettings(evidence=settings.vote_evidence))
-    interpreting = default_reasoners(usual, _rules(settings), traits=traits, early=settings.early)
+        reasoner_settings = replace(
+            reasoner_settings, votes=VoteSettings(evidence=settings.vote_evidence)
+        )
+    reasoners = default_reasoners(
+        reasoner_settings, _rules(settings), traits=traits, early=settings.early
+    )
     attention = (AttentionReasoner(),) if settings.attention else ()
     rules = activation_rules(contracts)
     activation = (ActivationReasoner(rules),) if rules else ()
     return Reasoners(
-        interpreting.update,
-        interpreting.cogitate,
+        reasoners.update,
+        reasoners.cogitate,
         match=(task_reasoner(tasks),) if tasks else (),
         attend=(*attention, *activation, runtime_fault_reasoner),
     )
 
 
-def _check_zones(tasks: Sequence[Task], drawn: Collection[str]) -> None:
+def _check_zones(tasks: Sequence[Task], defined: Collection[str]) -> None:
     """Check that every zone used is defined."""
     for task in tasks:
         if needs_ground(task) and task.ground is None:
@@ -350,7 +357,7 @@ def _check_zones(tasks: Sequence[Task], drawn: Collection[str]) -> None:
                 expected="`ground is (80, 400) = (0 m, 0 m), ...`, or a zones file with [ground]",
             )
         for zone in undrawn_zones(task):
-            if zone in drawn:
+            if zone in defined:
                 continue
             raise SettingsError(
                 f"zone `{zone}` of task `{task.name}` is not drawn anywhere",

@@ -31,7 +31,7 @@ STAYS_S = 10.0
 PATIENCE_S = 15.0
 """A life that has found no line for this long is left to the summary."""
 
-SAME_S, SAME_PAIR_S = 3.0, 10.0
+MIN_REPEAT_S, MIN_PAIR_REPEAT_S = 3.0, 10.0
 """Least time between two events of one kind about the same object, and the same pair, seconds."""
 
 ABOUT_OBJECTS = frozenset(
@@ -135,10 +135,13 @@ class Narrative:
 
     def _seldom(self, event: Event) -> bool:
         key = event.kind, *sorted(event.objects)
-        last, quiet = self._told.get(key), SAME_PAIR_S if len(event.objects) > 1 else SAME_S
+        last, quiet = (
+            self._told.get(key),
+            MIN_PAIR_REPEAT_S if len(event.objects) > 1 else MIN_REPEAT_S,
+        )
         if last is not None and event.time - last < quiet:
             return False
-        self._told = {k: t for k, t in self._told.items() if event.time - t < SAME_PAIR_S}
+        self._told = {k: t for k, t in self._told.items() if event.time - t < MIN_PAIR_REPEAT_S}
         self._told[key] = event.time
         return True
 

@@ -17,15 +17,15 @@ if TYPE_CHECKING:
     from rich.measure import Measurement
 
 
-WIDE = 1000
+PIPE_WIDTH = 1000
 """Width of output that is not a terminal, columns."""
 
 
-def make_console(*, whole: bool = False, **options: Any) -> Console:
+def make_console(*, unwrapped: bool = False, **options: Any) -> Console:
     """A rich console that prints only text passed by `printable`.
 
     Args:
-        whole: Whether to leave output to a pipe unwrapped and uncut.
+        unwrapped: Whether to leave output to a pipe unwrapped and uncut.
         options: As for `rich.console.Console`; highlighting is off by default.
     """
     from rich.console import Console, RenderHook
@@ -39,12 +39,12 @@ def make_console(*, whole: bool = False, **options: Any) -> Console:
     class Patient(Console):
         def on_broken_pipe(self) -> None:
             self.quiet = True
-            _reader_has_gone()
+            _discard_output()
 
     console = Patient(**{"highlight": False, **options})
     console.push_render_hook(Printable())
-    if whole and not console.is_terminal:
-        console.width = WIDE
+    if unwrapped and not console.is_terminal:
+        console.width = PIPE_WIDTH
     return console
 
 
@@ -87,15 +87,15 @@ def _print(text: str, end: str = "\n") -> None:
     try:
         print(text, end=end, flush=True)
     except BrokenPipeError:
-        _reader_has_gone()
+        _discard_output()
 
 
-def _reader_has_gone() -> None:
+def _discard_output() -> None:
     """Discard further output; Python still flushes its buffers when it ends."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def complain(message: str) -> None:
+def print_error(message: str) -> None:
     """Print an error to standard error."""
     from rich.text import Text
 

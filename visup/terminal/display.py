@@ -71,14 +71,16 @@ def shown(record: Any) -> RenderableType:
     rows = Table.grid(padding=(0, 1))
     for field in fields(record):
         if not field.name.startswith("_"):
-            rows.add_row(Text(field.name, style="dim"), Text(_brief(getattr(record, field.name))))
+            rows.add_row(
+                Text(field.name, style="dim"), Text(_short_text(getattr(record, field.name)))
+            )
     return Panel(rows, title=type(record).__name__, title_align="left", expand=False)
 
 
 def html(record: Any) -> str:
     """A record as self-contained HTML for a notebook cell, with its picture if it has one."""
     picture = record.draw() if isinstance(record, Step) and record.frame else None
-    return ("" if picture is None else html_picture(picture)) + html_of(_in_words(record))
+    return ("" if picture is None else html_picture(picture)) + html_of(_renderable(record))
 
 
 def html_of(text: RenderableType) -> str:
@@ -86,18 +88,18 @@ def html_of(text: RenderableType) -> str:
     console = Console(record=True, width=WIDTH + 20, file=StringIO(), force_jupyter=False)
     console.print(text)
     style = "font-family:Menlo,'DejaVu Sans Mono',monospace;line-height:1.2;white-space:pre"
-    made = console.export_html(
+    page = console.export_html(
         inline_styles=True, code_format=f'<pre style="{style}">{{code}}</pre>'
     )
     # Table borders are drawn in characters that do not join in notebook fonts.
-    return _UPRIGHT.sub(" ", _RULE.sub("", made))
+    return _VERTICAL_RULE.sub(" ", _HORIZONTAL_RULE.sub("", page))
 
 
-_RULE = re.compile("(?m)^[┏┓┗┛┡┩┳┻╇━┌┐└┘├┤┬┴┼─]+\n")
-_UPRIGHT = re.compile("[┃│]")
+_HORIZONTAL_RULE = re.compile("(?m)^[┏┓┗┛┡┩┳┻╇━┌┐└┘├┤┬┴┼─]+\n")
+_VERTICAL_RULE = re.compile("[┃│]")
 
 
-def _brief(value: object, most: int = 60) -> str:
+def _short_text(value: object, max_length: int = 60) -> str:
     """A value in brief: arrays by their shape, long texts truncated."""
     shape = getattr(value, "shape", None)
     if shape is not None and shape != ():
@@ -109,25 +111,25 @@ def _brief(value: object, most: int = 60) -> str:
     if is_dataclass(value) and not isinstance(value, type):
         return type(value).__name__
     text = str(value)
-    return text if len(text) <= most else f"{text[: most - 3]}..."
+    return text if len(text) <= max_length else f"{text[: max_length - 3]}..."
 
 
 @shown.register
 def _(record: Step) -> RenderableType:
-    text = _in_words(record)
+    text = _renderable(record)
     return Group(text_picture(record.draw()), text) if record.frame else text
 
 
-def _in_words(record: Any) -> RenderableType:
-    return _step_in_words(record) if isinstance(record, Step) else shown(record)
+def _renderable(record: Any) -> RenderableType:
+    return _step_summary(record) if isinstance(record, Step) else shown(record)
 
 
-def _step_in_words(record: Step) -> RenderableType:
+def _step_summary(record: Step) -> RenderableType:
     head = Text(f"step of frame {record.frame_index}, {record.time:.2f} s", style="bold")
-    told: list[RenderableType] = [event_row(e) for e in worded_once(record.events)]
-    told = told or [Text("no events", style="dim")]
-    asked = [shown(d) for d in record.directives]
-    return Group(head, *told, objects_table(record.mind.objects.values()), *asked)
+    events: list[RenderableType] = [event_row(e) for e in worded_once(record.events)]
+    events = events or [Text("no events", style="dim")]
+    directives = [shown(d) for d in record.directives]
+    return Group(head, *events, objects_table(record.mind.objects.values()), *directives)
 
 
 @shown.register
@@ -181,11 +183,11 @@ def _(record: Frame) -> RenderableType:
 
 @shown.register
 def _(record: Region) -> RenderableType:
-    seen = Observation(0, 0.0, (0, 0), (_only(record),))
+    seen = Observation(0, 0.0, (0, 0), (_report_of(record),))
     return Group(regions_table(seen), Text(_silhouette(record)))
 
 
-def _only(region: Region) -> Report:
+def _report_of(region: Region) -> Report:
     from visup.agent import ReportState
 
     return Report("", ReportState.RAN, ("region",), (Percept("region", region, 0.0, ""),))
@@ -220,7 +222,7 @@ def _(record: Alert) -> RenderableType:
 
 @shown.register
 def _(record: Directive) -> RenderableType:
-    data = ", ".join(f"{k} {_brief(v, 40)}" for k, v in record.data.items())
+    data = ", ".join(f"{k} {_short_text(v, 40)}" for k, v in record.data.items())
     return Text(f"asks: {record.kind} ({data}). {record.reason}", style="dim")
 
 
@@ -253,14 +255,14 @@ def _(record: StageBelief) -> RenderableType:
 @shown.register
 def _(record: Why) -> RenderableType:
     tree = Tree(Text(record.line()))
-    _hang(tree, record)
+    _add_parts(tree, record)
     return tree
 
 
-def _hang(tree: Tree, why: Why) -> None:
+def _add_parts(tree: Tree, why: Why) -> None:
     for part in why.parts:
         style = "cyan" if part.percept is not None else ""
-        _hang(tree.add(Text(part.line(), style=style)), part)
+        _add_parts(tree.add(Text(part.line(), style=style)), part)
 
 
 @shown.register

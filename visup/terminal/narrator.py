@@ -113,7 +113,7 @@ def verdict_line(verdict: Verdict | None, *, has_task: bool = True, part: str = 
     return f"Verdict: [{style}]{verdict.value}[/{style}]{part} ({VERDICT_TEXT[verdict]})"
 
 
-def part_seen(result: RunResult) -> str:
+def watched_part(result: RunResult) -> str:
     """How much of a source was seen, if not all of it; otherwise empty."""
     if not (result.problem or result.stopped):
         return ""

@@ -57,29 +57,29 @@ class Overview(TyperGroup):
             with formatter.section(purpose):
                 formatter.write_dl(list(commands.items()))
 
-    def make_context(self, *given: Any, **named: Any) -> Any:
+    def make_context(self, *arguments: Any, **options: Any) -> Any:
         """As usual, but error messages about bad arguments are made printable."""
-        with _printable_refusals():
-            return super().make_context(*given, **named)
+        with _printable_errors():
+            return super().make_context(*arguments, **options)
 
     def invoke(self, ctx: Any) -> Any:
         """As usual, but error messages about bad arguments are made printable."""
-        with _printable_refusals():
+        with _printable_errors():
             return super().invoke(ctx)
 
 
 @contextmanager
-def _printable_refusals() -> Iterator[None]:
+def _printable_errors() -> Iterator[None]:
     """Typer prints its own error messages, which quote names and values that may be untrusted."""
     try:
         yield
-    except Exception as refusal:
-        if isinstance(refusal, _REFUSAL):
+    except Exception as error:
+        if isinstance(error, _USAGE_ERROR):
             from visup.wording import printable
 
-            refusal.message = printable(refusal.message)
+            error.message = printable(error.message)
         raise
 
 
-_REFUSAL: Any = BadParameter.__mro__[2]
+_USAGE_ERROR: Any = BadParameter.__mro__[2]
 """Base class of typer's usage errors: click's in older versions, its own in newer ones."""

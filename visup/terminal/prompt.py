@@ -84,10 +84,10 @@ def read_commands(session: Session) -> Iterator[str]:
     from prompt_toolkit.auto_suggest import AutoSuggestFromHistory
     from prompt_toolkit.history import FileHistory, InMemoryHistory
 
-    place = history_file()
+    history_path = history_file()
     prompt: PromptSession[str] = PromptSession(
         completer=_completer(session),
-        history=FileHistory(str(place)) if place else InMemoryHistory(),
+        history=FileHistory(str(history_path)) if history_path else InMemoryHistory(),
         auto_suggest=AutoSuggestFromHistory(),
         bottom_toolbar=lambda: toolbar(session),
     )
@@ -103,8 +103,8 @@ def toolbar(session: Session) -> str:
     stepper = session.stepper
     branch = f"  branch from {stepper.begin}" if len(session.timelines) > 1 else ""
     inside = f"  after {stepper.paused.phase.value}" if stepper.paused else ""
-    place = f" step {stepper.at} of {stepper.made}{inside}{branch}  {stepper.mind.time:.2f} s"
-    return f"{place}  Tab completes, 'help step' explains"[:80]
+    position = f" step {stepper.at} of {stepper.made}{inside}{branch}  {stepper.mind.time:.2f} s"
+    return f"{position}  Tab completes, 'help step' explains"[:80]
 
 
 def history_file() -> Path | None:
@@ -112,17 +112,17 @@ def history_file() -> Path | None:
     base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     try:
         (base / "visup").mkdir(parents=True, exist_ok=True)
-        place = base / "visup" / "step-history"
-        place.touch()
+        path = base / "visup" / "step-history"
+        path.touch()
     except OSError:
         return None
-    return place
+    return path
 
 
 def _completer(session: Session) -> Completer:
     from prompt_toolkit.completion import Completer, Completion
 
-    class Completing(Completer):
+    class LastWordCompleter(Completer):
         """Completes the last word of the line."""
 
         def get_completions(
@@ -133,4 +133,4 @@ def _completer(session: Session) -> Completer:
             for word in completions(session, line):
                 yield Completion(word, start_position=-len(last))
 
-    return Completing()
+    return LastWordCompleter()

@@ -56,7 +56,7 @@ class Session:
     ) -> None:
         self._picture = picture
         self.timelines = [Stepper(agent, frames)]
-        self.console = console or make_console(whole=True)
+        self.console = console or make_console(unwrapped=True)
         self._marks: dict[str, Bookmark] = {}
 
     @property
@@ -111,9 +111,11 @@ class Session:
         names = [_SHORT[word]] if word in _SHORT else [n for n in _NAMES if n.startswith(word)]
         name = word if word in _NAMES else names[0] if len(names) == 1 else None
         if name is None:
-            near = did_you_mean(word, _NAMES)
-            meant = f" ({', '.join(names)}?)" if names else f" ({near})" if near else ""
-            return refusal(f"'{word}' is not a command{meant}; 'help' lists them")
+            suggestion = did_you_mean(word, _NAMES)
+            alternatives = (
+                f" ({', '.join(names)}?)" if names else f" ({suggestion})" if suggestion else ""
+            )
+            return refusal(f"'{word}' is not a command{alternatives}; 'help' lists them")
         try:
             if name in VIEWS:
                 return VIEWS[name](self.stepper, rest)
@@ -130,18 +132,18 @@ class Session:
 
     def _run(self, words: Sequence[str]) -> Answer:
         what = " ".join(words).removeprefix("until").strip()
-        return self._advance(None, what or _never)
+        return self._advance(None, what or _run_to_end)
 
     def _advance(self, count: int | None, what: str | Callable[[Step], bool]) -> Answer:
         stop: StopCondition | None = (
             parse_condition(what, self.stepper.mind, self.stepper.names) if what else None
         )
-        if stop is not None and self._is_past(stop):
+        if stop is not None and self._already_passed(stop):
             return refusal(f"{stop.text} has already passed; use 'go' or 'back'")
-        stopped = self.stepper.step(count, stop, self._tell)
-        return self._place(stopped)
+        stopped = self.stepper.step(count, stop, self._print_events)
+        return self._position(stopped)
 
-    def _is_past(self, stop: StopCondition) -> bool:
+    def _already_passed(self, stop: StopCondition) -> bool:
         mind = self.stepper.mind
         if mind.frame_index < 0:
             return False
@@ -149,14 +151,14 @@ class Session:
             return stop.time <= mind.time
         return isinstance(stop, FrameStop) and stop.frame <= mind.frame_index
 
-    def _tell(self, step: Step) -> None:
+    def _print_events(self, step: Step) -> None:
         for event in worded_once(step.events):
             if self.console.is_terminal:
                 self.console.print(event_row(event))
             else:  # a pipe has no width
                 self.console.print(Text(event_line(event)), soft_wrap=True)
 
-    def _place(self, stopped: StepResult | None = None) -> RenderableType:
+    def _position(self, stopped: StepResult | None = None) -> RenderableType:
         """The position of the session: reasons for stopping, watched values, frame and time."""
         mind, lines = self.stepper.mind, []
         if stopped is not None:
@@ -165,44 +167,44 @@ class Session:
                 lines.append(Text("the source has ended", style="yellow"))
         for watch in self.stepper.watches.values():
             values = [f"{_ids(r.objects)} {r}".strip() for r in watch.readings[:6]]
-            told = ", ".join(values) or "no object matches"
-            lines.append(Text(f"watch {watch.id}  {watch.text}: {told}", style="cyan"))
-        seen = sum(b.last_seen == mind.time for b in mind.objects.values())
-        regions = "1 region" if seen == 1 else f"{seen} regions"
+            value_text = ", ".join(values) or "no object matches"
+            lines.append(Text(f"watch {watch.id}  {watch.text}: {value_text}", style="cyan"))
+        visible = sum(b.last_seen == mind.time for b in mind.objects.values())
+        regions = "1 region" if visible == 1 else f"{visible} regions"
         where = f"frame {mind.frame_index}, {mind.time:.2f} s, {regions}"
-        lines.append(Text(f"{where}{self._aside()}", style="dim"))
+        lines.append(Text(f"{where}{self._position_details()}", style="dim"))
         return Group(*lines)
 
-    def _aside(self) -> str:
+    def _position_details(self) -> str:
         """Details of the position besides frame and time."""
         stepper = self.stepper
-        told = [f"; step {stepper.at} of {stepper.made}"] if stepper.at < stepper.made else []
+        details = [f"; step {stepper.at} of {stepper.made}"] if stepper.at < stepper.made else []
         if stepper.paused:
-            told.append(f"; inside the step, after {stepper.paused.phase.value}")
+            details.append(f"; inside the step, after {stepper.paused.phase.value}")
         if len(self.timelines) > 1:
-            told.append(f"; branch from step {stepper.begin}")
-        return "".join(told)
+            details.append(f"; branch from step {stepper.begin}")
+        return "".join(details)
 
     def _back(self, words: Sequence[str]) -> Answer:
         count = number_in(words) if words else 1
         if count is None:
             return refusal(usage("back"))
         self.stepper.back(count)
-        return self._place()
+        return self._position()
 
     def _go(self, words: Sequence[str]) -> Answer:
-        place = words[0] if words else ""
-        if place in self._marks:
-            self.stepper.restore(self._marks[place])
-        elif place in ("start", "end"):
-            self.stepper.go(self.stepper.begin if place == "start" else self.stepper.made)
-        elif place.removesuffix("s").replace(".", "", 1).isdecimal() and not place.isdecimal():
-            self.stepper.go_to_time(float(place.removesuffix("s")))
-        elif place.isdecimal():
-            self.stepper.go(int(place))
+        target = words[0] if words else ""
+        if target in self._marks:
+            self.stepper.restore(self._marks[target])
+        elif target in ("start", "end"):
+            self.stepper.go(self.stepper.begin if target == "start" else self.stepper.made)
+        elif target.removesuffix("s").replace(".", "", 1).isdecimal() and not target.isdecimal():
+            self.stepper.go_to_time(float(target.removesuffix("s")))
+        elif target.isdecimal():
+            self.stepper.go(int(target))
         else:
             return refusal(f"{usage('go')}; marks: {', '.join(self._marks) or 'none'}")
-        return self._place()
+        return self._position()
 
     def _mark(self, words: Sequence[str]) -> Answer:
         if not words:
@@ -227,14 +229,14 @@ class Session:
     ) -> Answer:
         """The frame of an explanation with its regions highlighted."""
         file = words[-1] if words and words[-1].endswith(PICTURES) else None
-        asked = list(words[:-1] if file else words)
-        if not asked:
+        question = list(words[:-1] if file else words)
+        if not question:
             return refusal("usage: show why WHAT, such as: show why alert 1")
-        negated, ask = asked[0] == "not", " ".join(asked)
+        negated, subject = question[0] == "not", " ".join(question)
         why = (
-            self.stepper.why_not(ask.removeprefix("not").strip())
+            self.stepper.why_not(subject.removeprefix("not").strip())
             if negated
-            else self.stepper.why(ask)
+            else self.stepper.why(subject)
         )
         frame, regions = why.regions
         if frame is None:
@@ -279,7 +281,7 @@ class Session:
         text = " ".join(words[breaks:])
         if text:
             self.stepper.watch(text, breaks=breaks)
-        return self._place() if self.stepper.watches else Text("no watches are set")
+        return self._position() if self.stepper.watches else Text("no watches are set")
 
     def _unwatch(self, words: Sequence[str]) -> Answer:
         number = number_in(words)
@@ -292,38 +294,38 @@ class Session:
 
     def _assume(self, words: Sequence[str], *, retract: bool) -> Answer:
         belief = parse_assumption(self.stepper.mind, words, self.agent.models, retract=retract)
-        return self._begin(self.stepper.branch(belief))
+        return self._enter_branch(self.stepper.branch(belief))
 
     def _use(self, words: Sequence[str]) -> Answer:
         if len(words) != 2 or words[0] not in ("rules", "task"):
             return refusal(usage("use"))
         reasoners = replaced_reasoners(self.agent.reasoners, words[0], words[1])
-        return self._begin(self.stepper.branch(reasoners=reasoners))
+        return self._enter_branch(self.stepper.branch(reasoners=reasoners))
 
-    def _begin(self, branch: Stepper) -> Answer:
+    def _enter_branch(self, branch: Stepper) -> Answer:
         for watch in self.stepper.watches.values():
             branch.watch(watch.text, breaks=watch.breaks)
         for point in self.stepper.breakpoints.values():
             branch.enable(branch.break_at(point.stop).id, point.enabled)
         self.timelines.append(branch)
-        return self._place()
+        return self._position()
 
     def _compare(self, words: Sequence[str]) -> Answer:
         changed = self.stepper.compare()
         marked = [("-", "red", e) for e in changed.gone] + [("+", "green", e) for e in changed.new]
-        told = [
+        events = [
             Text(prose(f"{mark} {float(e['time']):7.1f} s  {e['text']}"), style=style)
             for mark, style, e in marked
         ]
         before, after = changed.verdicts
         verdict = Text(f"verdict: {before or 'none'} -> {after or 'none'}")
-        return Group(*(told or [Text("no differences")]), verdict)
+        return Group(*(events or [Text("no differences")]), verdict)
 
     def _leave(self, words: Sequence[str]) -> Answer:
         if len(self.timelines) == 1:
             return refusal("this is not a branch")
         self.timelines.pop()
-        return self._place()
+        return self._position()
 
     def _answer(self, words: Sequence[str]) -> Answer:
         number = number_in(words)
@@ -333,7 +335,7 @@ class Session:
         if not self.stepper.may_answer:
             branch = self.stepper.branch()
             branch.answer(number, name)
-            return self._begin(branch)
+            return self._enter_branch(branch)
         self.stepper.answer(number, name)
         return Text("this counts as fact from the next step on", style="dim")
 
@@ -355,7 +357,7 @@ _ACTIONS: Mapping[str, Callable[[Session, Sequence[str]], Answer]] = MappingProx
         "assert": partial(Session._assume, retract=False),
         "forget": partial(Session._assume, retract=True),
         "use": Session._use,
-        "branch": lambda session, _: session._begin(session.stepper.branch()),
+        "branch": lambda session, _: session._enter_branch(session.stepper.branch()),
         "compare": Session._compare,
         "leave": Session._leave,
         "answer": Session._answer,
@@ -369,7 +371,7 @@ _SHORT = {"s": "step"}
 _NAMES = tuple(name for name in COMMANDS if name in _ACTIONS or name in VIEWS)
 
 
-def _never(step: Step) -> bool:
+def _run_to_end(step: Step) -> bool:
     return False
 
 

@@ -13,14 +13,14 @@ class Command:
 
     Attributes:
         usage: Its syntax.
-        does: Its effect, in one clause.
+        effect: Its effect, in one clause.
         more: Further help.
         completes: Kind of its arguments: 'stop', 'why', 'object', 'relation', 'break', 'mark', 'file',
             'command', 'expression'.
     """
 
     usage: str
-    does: str
+    effect: str
     more: str = ""
     completes: tuple[str, ...] = ()
 
@@ -32,7 +32,7 @@ class Command:
     @property
     def text(self) -> str:
         """The full help of the command."""
-        return f"{self.usage}\n  {self.does}" + (f"\n\n{self.more}" if self.more else "")
+        return f"{self.usage}\n  {self.effect}" + (f"\n\n{self.more}" if self.more else "")
 
 
 _WHERE = """\
@@ -155,7 +155,7 @@ COMMANDS: Mapping[str, Command] = MappingProxyType({c.name: c for c in _COMMANDS
 _WIDTH = max(len(c.usage) for c in _COMMANDS)
 HELP = "\n".join(
     [
-        *(f"{c.usage:<{_WIDTH}} {c.does}" for c in _COMMANDS),
+        *(f"{c.usage:<{_WIDTH}} {c.effect}" for c in _COMMANDS),
         f"{'quit':<{_WIDTH}} leave the session",
         "Any unambiguous prefix of a command works; an empty line repeats the last one.",
     ]

@@ -43,7 +43,7 @@ def refusal(text: str) -> Refusal:
 
 def usage(name: str) -> str:
     """The syntax and the effect of a command."""
-    return f"{COMMANDS[name].usage}: {COMMANDS[name].does}"
+    return f"{COMMANDS[name].usage}: {COMMANDS[name].effect}"
 
 
 def number_in(words: Words) -> int | None:
@@ -84,13 +84,13 @@ def _diff(stepper: Stepper, words: Words) -> RenderableType:
 
 
 def _percepts(stepper: Stepper, words: Words) -> RenderableType:
-    seen = observation_of(stepper)
-    return shown(seen) if seen else _NO_STEP
+    observation = observation_of(stepper)
+    return shown(observation) if observation else _NO_STEP
 
 
 def _behaviours(stepper: Stepper, words: Words) -> RenderableType:
-    seen = observation_of(stepper)
-    return behaviours_table(seen.reports) if seen else _NO_STEP
+    observation = observation_of(stepper)
+    return behaviours_table(observation.reports) if observation else _NO_STEP
 
 
 def _candidates(stepper: Stepper, words: Words) -> RenderableType:
@@ -102,10 +102,10 @@ def _candidates(stepper: Stepper, words: Words) -> RenderableType:
 
 
 def _events(stepper: Stepper, words: Words) -> RenderableType:
-    most = number_in(words) if words else 10
-    if not most:
+    count = number_in(words) if words else 10
+    if not count:
         return refusal(usage("events"))
-    latest = list(stepper.events(last=stepper.at))[-most:]
+    latest = list(stepper.events(last=stepper.at))[-count:]
     rows = Table.grid(padding=(0, 1))
     for number, event in latest:
         rows.add_row(Text(f"step {number}", style="dim"), event_row(event))
@@ -120,8 +120,8 @@ def _relations(stepper: Stepper, words: Words) -> RenderableType:
 
 
 def _directives(stepper: Stepper, words: Words) -> RenderableType:
-    asked = stepper.agent.directives
-    return Group(*map(shown, asked)) if asked else Text("no requests")
+    directives = stepper.agent.directives
+    return Group(*map(shown, directives)) if directives else Text("no requests")
 
 
 VIEWS: Mapping[str, View] = MappingProxyType(

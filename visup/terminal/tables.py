@@ -67,10 +67,10 @@ def candidates_table(belief: ObjectBelief) -> Table:
 def relations_table(relations: Iterable[Relation], object_id: int | None = None) -> Table:
     """Relations between objects; those of a single object include the less common ones."""
     rows = table("relation", "objects", "truth", "since", "value", "confidence")
-    told = relations
+    shown = relations
     if object_id is not None and isinstance(relations, RelationTable):
-        told = relations.all()
-    for r in told:
+        shown = relations.all()
+    for r in shown:
         if object_id is None or object_id in r.objects:
             value = "" if r.value is None else f"{r.value:.1f}"
             objects = " ".join(map(str, r.objects))
@@ -90,12 +90,14 @@ def task_tree(task: TaskBelief) -> Tree:
     """The state of one task."""
     tree = Tree(Text(prose(f"{task.task}: {task.verdict.value}  {task.evidence}".rstrip())))
     for s in task.stages:
-        here = "> " if s.stage == task.current else "  "
-        told = f"{here}{s.stage}: {s.status.value} since {s.since:.1f} s  {s.evidence}"
-        tree.add(Text(prose(told.rstrip())))
+        marker = "> " if s.stage == task.current else "  "
+        line = f"{marker}{s.stage}: {s.status.value} since {s.since:.1f} s  {s.evidence}"
+        tree.add(Text(prose(line.rstrip())))
     for b in task.bindings:
-        who = f"object {b.object_id} ({b.strength:.2f})" if b.object_id is not None else "no object"
-        tree.add(Text(f"  {b.actor} is bound to {who}"))
+        object_text = (
+            f"object {b.object_id} ({b.strength:.2f})" if b.object_id is not None else "no object"
+        )
+        tree.add(Text(f"  {b.actor} is bound to {object_text}"))
     tree.add(Text(prose(f"  {prospects_text(task)}")))
     if task.active < 1.0:
         tree.add(Text(f"  active with probability {task.active:.2f}"))

@@ -41,12 +41,12 @@ def parse_assumption(
     Raises:
         SettingsError: They are no assumption.
     """
-    said = [w for w in re.findall(r"[^\s,()]+", " ".join(words)) if w != "relation"]
-    if not said:
+    assumed = [w for w in re.findall(r"[^\s,()]+", " ".join(words)) if w != "relation"]
+    if not assumed:
         raise SettingsError("no belief was given", expected=_EXPECTED)
-    if said[0] in ("object", "identity", "presence"):
-        return _of_object(mind, said[1:], models, retract)
-    return _relation(mind, said, retract)
+    if assumed[0] in ("object", "identity", "presence"):
+        return _of_object(mind, assumed[1:], models, retract)
+    return _relation(mind, assumed, retract)
 
 
 _EXPECTED = "such as: touching 1 2 true, object 1 arm, object 2 hidden"
@@ -75,10 +75,10 @@ def _of_object(mind: Mind, words: list[str], models: Iterable[str], retract: boo
     _known(mind, object_id)
     if retract:
         return AssumedIdentity(object_id, UNKNOWN_OBJECT)
-    said = " ".join(words[1:])
-    if said in _PRESENCES:
-        return AssumedPresence(object_id, Presence(said))
-    return AssumedIdentity(object_id, resolve_answer(mind, object_id, said, models))
+    value = " ".join(words[1:])
+    if value in _PRESENCES:
+        return AssumedPresence(object_id, Presence(value))
+    return AssumedIdentity(object_id, resolve_answer(mind, object_id, value, models))
 
 
 def _known(mind: Mind, object_id: int) -> None:
@@ -87,17 +87,17 @@ def _known(mind: Mind, object_id: int) -> None:
         raise SettingsError(f"there is no object {object_id}", expected=known)
 
 
-def replaced_reasoners(reasoners: Reasoners, kind: str, place: str) -> Reasoners:
+def replaced_reasoners(reasoners: Reasoners, kind: str, where: str) -> Reasoners:
     """Reasoners with other rules or another task.
 
     Args:
         reasoners: The present reasoners.
         kind: 'rules' or 'task'.
-        place: A file, or the name of a shipped task.
+        where: A file, or the name of a shipped task.
 
     Raises:
         VisupError: The file is not valid.
     """
     if kind == "rules":
-        return with_rules(reasoners, load_rules(place))
-    return with_tasks(reasoners, load_tasks(place))
+        return with_rules(reasoners, load_rules(where))
+    return with_tasks(reasoners, load_tasks(where))

@@ -103,7 +103,7 @@ class ConditionSearch:
         judge = ConditionJudge(self.pattern)
         minds = read_minds(recording.path.parent) if self.quick else None
         if minds is None:
-            replay(recording, settings, tell=judge)
+            replay(recording, settings, on_step=judge)
         for mind in minds or ():
             judge.judge(mind)
         return tuple(h for h in judge.hits() if self.unknown or h.truth == Truth.TRUE)
@@ -139,7 +139,7 @@ class RulesSearch:
                 named = tuple(step.mind.objects[i].name for i in alert.objects)
                 alerts[alert.id] = alert, alerts.get(alert.id, (alert, named))[1]
 
-        replay(recording, replace(settings, rules=(self.file,)), tell=look)
+        replay(recording, replace(settings, rules=(self.file,)), on_step=look)
         kinds = {rule.name for rule in self.rules}
         return tuple(
             Hit(

@@ -33,7 +33,7 @@ class TaskSearch:
     def hits(self, recording: Recording, settings: WatchSettings) -> tuple[Hit, ...]:
         """See `Search`: from the first active stage to success."""
         watch = _TaskTimes()
-        replay(recording, changed_settings(settings, tasks=(str(self.file),)), tell=watch)
+        replay(recording, changed_settings(settings, tasks=(str(self.file),)), on_step=watch)
         return tuple(sorted(watch.done.values(), key=lambda hit: (hit.end, hit.rule)))
 
 

@@ -149,14 +149,14 @@ def add(
     from visup.agent.model.errors import VisupError
     from visup.archive.adding import add_run
     from visup.archive.storing.places import create_lake, store_of
-    from visup.terminal.console import complain, echo
+    from visup.terminal.console import echo, print_error
 
     lake, store, failed = create_lake(into), store_of(into), 0
     for folder in runs:
         try:
             key, added = add_run(lake, folder)
         except VisupError as fault:
-            complain(str(fault))
+            print_error(str(fault))
             failed += 1
         else:
             echo(f"{key}  {folder}" if added else f"{key}  {folder} was already there")

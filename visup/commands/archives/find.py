@@ -110,14 +110,14 @@ def _cut(console: Console | None, found: FoundRun, folder: Path) -> None:
     """Cut the hits of a run out of its footage; missing footage is reported and does not stop the rest."""
     from visup.agent.model.errors import SourceError
     from visup.archive.finding.clips import cut_hits
-    from visup.terminal.console import complain
+    from visup.terminal.console import print_error
 
     try:
         for path in cut_hits(found.clip, found.run, found.hits, folder):
             if console:
                 console.print(f"  video: {path}", soft_wrap=True, markup=False, style="dim")
     except SourceError as fault:
-        complain(str(fault))
+        print_error(str(fault))
 
 
 def _print_run(console: Console, found: FoundRun, as_json: bool) -> None:

@@ -62,7 +62,7 @@ def query(
     if not (sql or options.tables or options.examples):
         raise typer.BadParameter("give a query, or see --examples", param_hint="SQL")
     form = format_of(options.form, options.out)
-    console = make_console(whole=True)
+    console = make_console(unwrapped=True)
     with open_database(open_lake(lake), options.memory_gb) as database:
         if options.tables:
             _show_tables(console, database)

@@ -83,7 +83,7 @@ def check(
     """
     from visup.serving.site.checking import check_camera, load_lines, store_fault
     from visup.serving.site.reading import read_site
-    from visup.terminal.console import complain, echo
+    from visup.terminal.console import echo, print_error
 
     site = read_site(site_file)
     checks = []
@@ -95,9 +95,11 @@ def check(
         echo(line)
     refused = [c.camera.name for c in checks if c.fault]
     if fault := store_fault(site):
-        complain(fault)
+        print_error(fault)
     if refused:
-        complain(f"{len(refused)} of {len(checks)} cameras cannot be watched: {', '.join(refused)}")
+        print_error(
+            f"{len(refused)} of {len(checks)} cameras cannot be watched: {', '.join(refused)}"
+        )
     if refused or fault:
         raise typer.Exit(ExitCode.BAD_INPUT)
     echo(f"All {len(checks)} cameras can be watched." if len(checks) > 1 else "It can be watched.")
@@ -105,14 +107,14 @@ def check(
 
 def _print_check(checked: CameraCheck) -> None:
     from visup.serving.site.checking import speed_line
-    from visup.terminal.console import complain, echo
+    from visup.terminal.console import echo, print_error
 
     for line in checked.lines:
         echo(f"  {line}")
     if checked.speed:
         echo(f"  {speed_line(checked.speed)}")
     if checked.fault:
-        complain(f"camera {checked.camera.name}: {checked.fault}")
+        print_error(f"camera {checked.camera.name}: {checked.fault}")
 
 
 @app.command()

@@ -117,7 +117,7 @@ def _watched(source: Path, limit: int | None) -> AlarmCounts:
 def _recorded(run: Path) -> AlarmCounts:
     counts = AlarmCounts()
     recording = Recording.open(run)
-    replay(recording, replace(settings_for(recording), tasks=(), actors={}), tell=counts)
+    replay(recording, replace(settings_for(recording), tasks=(), actors={}), on_step=counts)
     return counts
 
 

@@ -191,7 +191,7 @@ def _told(lake: Lake) -> tuple[Transcript, Beliefs]:
         ]
 
     (run,) = lake.runs()
-    return replay(*lake.recorded(run), tell=look), seen
+    return replay(*lake.recorded(run), on_step=look), seen
 
 
 def _silent(outcome: ClipOutcome) -> None:

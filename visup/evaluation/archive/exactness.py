@@ -97,7 +97,7 @@ def _compare(lake: Lake, texts: Sequence[str], rules: Path, found: FindCompariso
             for n, judge in enumerate(judges):
                 _compare_step(step, judge, f"f{n}", texts[n], found)
 
-        replay(recording, replace(settings, rules=(rules,)), tell=look)
+        replay(recording, replace(settings, rules=(rules,)), on_step=look)
         for n, judge in enumerate(judges):
             hits = tuple(h for h in judge.hits() if h.truth == Truth.TRUE)
             found.note(texts[n], not hits or run in possible[n])

@@ -20,7 +20,7 @@ from visup.archive.lake import Lake
 from visup.evaluation.archive.calibrating import RunTruth
 from visup.rules.identity.votes import ObjectVotes, VoteSettings, object_votes
 from visup.runs.replay import replay
-from visup.runs.settings import LARGEST_EVIDENCE
+from visup.runs.settings import MAX_EVIDENCE
 
 LEAST_EVIDENCE = 0.05
 SPREAD = 0.5
@@ -68,9 +68,7 @@ def fitted_evidence(labelled: Sequence[LabelledVotes]) -> float | None:
         misfit = -sum(log(max(1e-12, one.likelihood(exp(x)))) for one in labelled)
         return misfit + 0.5 * ((x - usual) / SPREAD) ** 2
 
-    found = minimize_scalar(
-        cost, bounds=(log(LEAST_EVIDENCE), log(LARGEST_EVIDENCE)), method="bounded"
-    )
+    found = minimize_scalar(cost, bounds=(log(LEAST_EVIDENCE), log(MAX_EVIDENCE)), method="bounded")
     return float(exp(found.x))
 
 
@@ -93,7 +91,7 @@ def labelled_votes(lake: Lake, truth: Mapping[str, RunTruth]) -> Iterator[Labell
             nonlocal mind
             mind = step.mind
 
-        replay(*lake.recorded(run), tell=look)
+        replay(*lake.recorded(run), on_step=look)
         for number, belief in sorted(mind.objects.items()):
             name = truth[run].objects.get(str(number))
             counted = object_votes(mind, number)

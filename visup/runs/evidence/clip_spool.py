@@ -21,11 +21,11 @@ from visup.runs.evidence.frame_ring import EncodedFrame
 
 SUFFIX = ".spool"
 _HEAD = struct.Struct("<dI")
-LARGEST_FRAME = 2**26
-FASTEST, SLOWEST = 30.0, 1.0
+MAX_FRAME_BYTES = 2**26
+MAX_FPS, MIN_FPS = 30.0, 1.0
 """Limits of the frame rate of a clip, frames per second."""
 
-LEAST_FREE = 2**24
+MIN_FREE_BYTES = 2**24
 """Bytes that must be free on the disk before and after: the encoder does not report a full disk."""
 
 
@@ -62,12 +62,12 @@ def spooled(path: Path) -> Iterator[EncodedFrame]:
     with path.open("rb") as file:
         while len(head := file.read(_HEAD.size)) == _HEAD.size:
             time, size = _HEAD.unpack(head)
-            if size > LARGEST_FRAME or len(jpeg := file.read(size)) < size:
+            if size > MAX_FRAME_BYTES or len(jpeg := file.read(size)) < size:
                 return
             yield EncodedFrame(time, jpeg)
 
 
-def write_clip_of(spool: Path, target: Path, fps: float) -> None:
+def encode_clip(spool: Path, target: Path, fps: float) -> None:
     """Encode the video of a spool, and delete the spool.
 
     Args:
@@ -79,16 +79,16 @@ def write_clip_of(spool: Path, target: Path, fps: float) -> None:
         OutputError: There is not enough space; the spool stays.
         OSError: A file cannot be read or written.
     """
-    fps = min(FASTEST, max(SLOWEST, fps))
+    fps = min(MAX_FPS, max(MIN_FPS, fps))
     draft = target.with_name(f".{target.stem}.part.webm")
     try:
-        _check_room(target.parent)
+        _check_free_space(target.parent)
         with WebmWriter(draft, fps) as video:
-            for frame in evenly(spooled(spool), fps):
+            for frame in at_constant_rate(spooled(spool), fps):
                 image = cv2.imdecode(np.frombuffer(frame.jpeg, np.uint8), cv2.IMREAD_COLOR)
                 if image is not None:
                     video.write(np.asarray(image, np.uint8))
-        _check_room(target.parent)
+        _check_free_space(target.parent)
         if draft.exists():  # a spool without a complete frame makes no video
             draft.replace(target)
     finally:
@@ -96,25 +96,25 @@ def write_clip_of(spool: Path, target: Path, fps: float) -> None:
     spool.unlink(missing_ok=True)
 
 
-def evenly(frames: Iterable[EncodedFrame], fps: float) -> Iterator[EncodedFrame]:
+def at_constant_rate(frames: Iterable[EncodedFrame], fps: float) -> Iterator[EncodedFrame]:
     """Resample frames to a constant rate: at each tick the latest frame.
 
     >>> frames = [EncodedFrame(t, b"") for t in (0.0, 0.1, 1.0)]
-    >>> [frame.time for frame in evenly(frames, 4.0)]
+    >>> [frame.time for frame in at_constant_rate(frames, 4.0)]
     [0.0, 0.1, 0.1, 0.1, 1.0]
     """
-    begin: float | None = None
-    shown, last = 0, None
+    start: float | None = None
+    emitted, last = 0, None
     for frame in frames:
-        begin = frame.time if begin is None else begin
-        while last is not None and begin + shown / fps < frame.time - 1e-6:
+        start = frame.time if start is None else start
+        while last is not None and start + emitted / fps < frame.time - 1e-6:
             yield last
-            shown += 1
+            emitted += 1
         last = frame
     if last is not None:
         yield last
 
 
-def _check_room(folder: Path) -> None:
-    if shutil.disk_usage(folder).free < LEAST_FREE:
+def _check_free_space(folder: Path) -> None:
+    if shutil.disk_usage(folder).free < MIN_FREE_BYTES:
         raise OutputError("the disk has no room for a clip", where=str(folder))

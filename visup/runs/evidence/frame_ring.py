@@ -14,10 +14,10 @@ from visup.percepts.motion.pausing import cell_means
 from visup.report.video import playable_size
 
 QUALITY = 80
-SAME_S = 0.95
+MAX_REUSE_S = 0.95
 """How long a frame replaces the following ones that show nothing new, seconds."""
 
-VISIBLE = 3
+MIN_VISIBLE_CHANGE = 3
 """Difference of the mean of 8 x 8 pixels that counts as visible, grey levels; camera noise causes one or
 two."""
 
@@ -78,16 +78,16 @@ class FrameEncoder:
             time: Seconds of the source.
         """
         small = cell_means(image)
-        fresh = 0.0 <= time - self._since < SAME_S
-        if self._last and fresh and self._small is not None and _alike(self._small, small):
+        recent = 0.0 <= time - self._since < MAX_REUSE_S
+        if self._last and recent and self._small is not None and _look_the_same(self._small, small):
             self._last = EncodedFrame(time, self._last.jpeg)
         else:
             self._last, self._since, self._small = encoded(image, time), time, small
         return self._last
 
 
-def _alike(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> bool:
-    return a.shape == b.shape and int(cv2.absdiff(a, b).max()) < VISIBLE
+def _look_the_same(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> bool:
+    return a.shape == b.shape and int(cv2.absdiff(a, b).max()) < MIN_VISIBLE_CHANGE
 
 
 class FrameRing:
@@ -95,15 +95,15 @@ class FrameRing:
 
     Args:
         span_s: How long a frame is kept, seconds of the source.
-        most_bytes: Limit of their total size; beyond it the oldest are dropped earlier.
+        max_bytes: Limit of their total size; beyond it the oldest are dropped earlier.
 
     Attributes:
         size: Present total size, bytes.
     """
 
-    def __init__(self, span_s: float, most_bytes: int) -> None:
+    def __init__(self, span_s: float, max_bytes: int) -> None:
         self.size = 0
-        self._span_s, self._most_bytes = span_s, most_bytes
+        self._span_s, self._max_bytes = span_s, max_bytes
         self._frames: deque[EncodedFrame] = deque()
 
     def add(self, frame: EncodedFrame) -> None:
@@ -111,7 +111,7 @@ class FrameRing:
         self._frames.append(frame)
         self.size += len(frame.jpeg)
         while self._frames and (
-            self.size > self._most_bytes or frame.time - self._frames[0].time > self._span_s
+            self.size > self._max_bytes or frame.time - self._frames[0].time > self._span_s
         ):
             self.size -= len(self._frames.popleft().jpeg)
 

@@ -19,7 +19,7 @@ from visup.agent.storage.text_file import read_bounded
 from visup.runs.operator import parse_answers
 
 ANSWERS = "answers.txt"
-LARGEST_FILE = 2**16
+MAX_FILE_BYTES = 2**16
 """Maximum size of the answers to a run, bytes."""
 
 
@@ -35,13 +35,13 @@ def put_answer(folder: Path, object_id: int, name: str) -> None:
         SettingsError: The name cannot be part of such a line.
         OutputError: The folder cannot be written, or has too many answers already.
     """
-    ((number, said),) = parse_answers([f"{object_id}={' '.join(name.split())}"]).items()
+    ((number, answer),) = parse_answers([f"{object_id}={' '.join(name.split())}"]).items()
     path = folder / ANSWERS
     try:
         with only_writer(path, "answers to this run"), path.open("a", encoding="utf-8") as out:
-            if out.tell() > LARGEST_FILE // 2:
+            if out.tell() > MAX_FILE_BYTES // 2:
                 raise OutputError("too many answers wait for this run", where=str(path))
-            out.write(f"{number}={said}\n")
+            out.write(f"{number}={answer}\n")
     except OSError as fault:
         why = f"the answer cannot be kept: {fault.strerror}"
         raise OutputError(why, where=str(path)) from fault
@@ -53,39 +53,42 @@ class AnswerBox:
     Args:
         agent: The agent.
         folder: Gives the folder, which changes when a run rolls over; None for none.
-        tell: Receives errors of lines.
+        report_error: Receives errors of lines.
     """
 
     def __init__(
-        self, agent: Agent, folder: Callable[[], Path | None], tell: Callable[[str], None] | None
+        self,
+        agent: Agent,
+        folder: Callable[[], Path | None],
+        report_error: Callable[[str], None] | None,
     ) -> None:
-        self._agent, self._folder, self._tell = agent, folder, tell
+        self._agent, self._folder, self._report_error = agent, folder, report_error
         self._path: Path | None = None
-        self._read = 0
+        self._bytes_read = 0
         self._waiting: dict[int, str] = {}
 
     def __call__(self, step: Step, frame: Frame) -> None:
         """Pass on new answers about known objects."""
         for line in self._new_lines():
-            self._try(self._note, line)
+            self._try(self._receive, line)
         for number in [i for i in self._waiting if i in self._agent.mind.objects]:
-            self._try(self._take, number, self._waiting.pop(number))
+            self._try(self._pass_on, number, self._waiting.pop(number))
 
-    def _note(self, line: str) -> None:
+    def _receive(self, line: str) -> None:
         self._waiting.update(parse_answers([line]))
 
-    def _take(self, number: int, name: str) -> None:
+    def _pass_on(self, number: int, name: str) -> None:
         agent = self._agent
-        meant = resolve_model(agent.mind, name, agent.models, cast=agent.cast)
-        if agent.mind.answers.get(number) != meant:
+        model = resolve_model(agent.mind, name, agent.models, cast=agent.cast)
+        if agent.mind.answers.get(number) != model:
             agent.answer(number, name)
 
-    def _try(self, act: Callable[..., None], *given: object) -> None:
+    def _try(self, action: Callable[..., None], *arguments: object) -> None:
         try:
-            act(*given)
+            action(*arguments)
         except VisupError as fault:
-            if self._tell:
-                self._tell(str(fault))
+            if self._report_error:
+                self._report_error(str(fault))
 
     def _new_lines(self) -> list[str]:
         """New complete lines."""
@@ -93,13 +96,13 @@ class AnswerBox:
         if folder is None:
             return []
         if (path := folder / ANSWERS) != self._path:
-            self._path, self._read = path, 0
+            self._path, self._bytes_read = path, 0
         try:
-            if path.stat().st_size == self._read:
+            if path.stat().st_size == self._bytes_read:
                 return []
-            new = read_bounded(path, LARGEST_FILE)[self._read :]
+            new = read_bounded(path, MAX_FILE_BYTES)[self._bytes_read :]
         except OSError:
             return []  # no answers yet, or not a regular file
-        whole = new[: new.rfind(b"\n") + 1]
-        self._read += len(whole)
-        return whole.decode("utf-8", errors="replace").splitlines()
+        complete = new[: new.rfind(b"\n") + 1]
+        self._bytes_read += len(complete)
+        return complete.decode("utf-8", errors="replace").splitlines()

@@ -23,7 +23,7 @@ OWN = "visup."
 
 
 @dataclass(frozen=True, slots=True)
-class _Offer:
+class _BehaviourSource:
     """A file or module and the contracts of its behaviours; None if it is imported here anyway."""
 
     where: str
@@ -40,25 +40,27 @@ def user_behaviours(settings: WatchSettings) -> list[Behaviour]:
     registry = discover_behaviours() if settings.plugins else None
     named = [registry.where(name) for name in settings.plugins] if registry else []
     values = settings.plugin_settings
-    offers = []
+    sources = []
     for where in (*named, *map(str, settings.behaviours)):
-        own = where.startswith(OWN) or not CAN_ISOLATE
-        offers.append(_Offer(where, None if own else tuple(read_contracts(where, values))))
-    made = [b for offer in offers for b in _create(offer, settings)]
-    _check_known(settings, [b.contract.name for b in made])
-    return made
+        import_here = where.startswith(OWN) or not CAN_ISOLATE
+        sources.append(
+            _BehaviourSource(where, None if import_here else tuple(read_contracts(where, values)))
+        )
+    behaviours = [b for source in sources for b in _create(source, settings)]
+    _check_known(settings, [b.contract.name for b in behaviours])
+    return behaviours
 
 
-def _create(offer: _Offer, settings: WatchSettings) -> Iterable[Behaviour]:
+def _create(source: _BehaviourSource, settings: WatchSettings) -> Iterable[Behaviour]:
     values = settings.plugin_settings
-    told = offer.contracts
-    apart = {c.name: c for c in told or () if c.isolate or c.name in settings.isolate}
-    if told is None or len(apart) < len(told):
-        for behaviour in load_behaviours(offer.where, values):
-            if behaviour.contract.name not in apart:
+    contracts = source.contracts
+    isolated = {c.name: c for c in contracts or () if c.isolate or c.name in settings.isolate}
+    if contracts is None or len(isolated) < len(contracts):
+        for behaviour in load_behaviours(source.where, values):
+            if behaviour.contract.name not in isolated:
                 yield behaviour
-    for name, contract in apart.items():
-        yield IsolatedBehaviour(contract, offer.where, values.get(name, {}))
+    for name, contract in isolated.items():
+        yield IsolatedBehaviour(contract, source.where, values.get(name, {}))
 
 
 def _check_known(settings: WatchSettings, known: list[str]) -> None:

@@ -61,17 +61,17 @@ def check_cast(settings: WatchSettings, agent: Agent, *, answered: bool = False)
         SettingsError: No actor of any task can be recognised.
     """
     tasks = [t for name in settings.tasks for t in load_tasks(name)]
-    lost = unrecognisable(tasks, agent.mind.actors, agent.models)
-    if not lost or answered or settings.behaviours or settings.plugins:
+    missing = unrecognisable(tasks, agent.mind.actors, agent.models)
+    if not missing or answered or settings.behaviours or settings.plugins:
         return ()
     cast = ((t.actor(a), a) for t in tasks for a in task_actors(t))
-    needed = {actor.spare or name for actor, name in cast if not actor.optional}
-    if needed and needed <= set(lost):
-        raise _refusal(settings, tasks, lost)
+    required = {actor.spare or name for actor, name in cast if not actor.optional}
+    if required and required <= set(missing):
+        raise _actors_unknown(settings, tasks, missing)
     return tuple(
         f"It is not known what the actor '{actor}' looks like: the model database has no "
         f"{' or '.join(repr(m) for m in models)}."
-        for actor, models in lost.items()
+        for actor, models in missing.items()
     )
 
 
@@ -88,14 +88,14 @@ def unrecognisable(
     Returns:
         Actor -> the missing models.
     """
-    lost: dict[str, tuple[str, ...]] = {}
+    missing: dict[str, tuple[str, ...]] = {}
     for task in tasks:
         for actor in task_actors(task):
             kind = task.actor(actor).spare or actor
             models = actors.get(actor) or actors.get(kind) or task.models(actor)
             if models and not set(models) & set(known):
-                lost[kind] = models
-    return lost
+                missing[kind] = models
+    return missing
 
 
 def readiness(settings: WatchSettings, agent: Agent) -> Iterator[str]:
@@ -116,17 +116,17 @@ def readiness(settings: WatchSettings, agent: Agent) -> Iterator[str]:
         yield f"zones: {', '.join(z.name for z in agent.mind.zones)}"
 
 
-def _refusal(
+def _actors_unknown(
     settings: WatchSettings, tasks: Sequence[Task], lost: Mapping[str, tuple[str, ...]]
 ) -> SettingsError:
     names = ", ".join(f"`{t.name}`" for t in tasks)
-    who = ", ".join(f"'{a}'" for a in lost)
+    quoted = ", ".join(f"'{a}'" for a in lost)
     actor, models = next(iter(lost.items()))
     missing = (
         f"{settings.models} has no model of them" if settings.models else "there are no models"
     )
     return SettingsError(
-        f"task {names} cannot be followed: it is not known what its actors look like ({who}; {missing})",
+        f"task {names} cannot be followed: it is not known what its actors look like ({quoted}; {missing})",
         expected="a model database that contains them (--models DB), and --actor NAME=MODEL where the "
         f"names differ; or a task that describes them, such as: actor {actor} is red",
         hint=f"outline them once: visup teach {redacted(settings.source)} --models cell.models"
@@ -136,11 +136,11 @@ def _refusal(
     )
 
 
-def told_of_actors(given: Collection[str], actors: Collection[str]) -> tuple[str, ...]:
+def taught_actor_notes(bound: Collection[str], actors: Collection[str]) -> tuple[str, ...]:
     """A sentence on each actor that is bound to a taught model instead of the declared ones."""
     return tuple(
         f"The actor '{actor}' is what was taught as '{actor}': the model database has none of the "
         "models that its task names."
         for actor in actors
-        if actor not in given
+        if actor not in bound
     )

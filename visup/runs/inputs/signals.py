@@ -43,7 +43,7 @@ def _source(place: str) -> SignalSource:
 
 def check_signals(
     contracts: Iterable[Contract],
-    told: Iterable[SignalBehaviour],
+    sources: Iterable[SignalBehaviour],
     rules: Iterable[Rule],
     tasks: Iterable[Task],
 ) -> None:
@@ -51,21 +51,21 @@ def check_signals(
 
     Args:
         contracts: Contracts of all behaviours; a user behaviour with signals may provide any.
-        told: Behaviours for the signals of the settings.
+        sources: Behaviours for the signals of the settings.
         rules: Rules of the run.
         tasks: Tasks of the run.
 
     Raises:
         SettingsError: A signal is not provided.
     """
-    givers = [c for c in contracts if SIGNAL in c.gives]
-    known = frozenset[str]().union(*(b.names for b in told))
-    if len(givers) > len(list(told)) or (givers and not known):
+    providers = [c for c in contracts if SIGNAL in c.gives]
+    known = frozenset[str]().union(*(b.names for b in sources))
+    if len(providers) > len(list(sources)) or (providers and not known):
         return
-    for name, who, where in _used_signals(rules, tasks):
+    for name, user, where in _used_signals(rules, tasks):
         if name in known:
             continue
-        what = f"{who} asks for the signal `{name}`, which no source provides"
+        what = f"{user} asks for the signal `{name}`, which no source provides"
         near = did_you_mean(name, known) if known else None
         expected = f"one of: {', '.join(sorted(known))}" if known else "`--signal FILE.csv`"
         raise SettingsError(what, where=where or None, expected=expected, hint=near)

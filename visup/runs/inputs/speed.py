@@ -43,15 +43,15 @@ def measured_speed(settings: WatchSettings, frames: int) -> Speed:
     Raises:
         VisupError: The run cannot begin.
     """
-    took = []
+    durations = []
     agent = build_agent(settings)
     try:
         with open_video(settings) as video:
             for frame in islice(video, frames):
                 begin = time.perf_counter()
                 agent.step(frame)
-                took.append(time.perf_counter() - begin)
+                durations.append(time.perf_counter() - begin)
             wanted = video.fps / video.every
     finally:
         agent.close()
-    return Speed(1.0 / median(took[len(took) // 3 :]), wanted)
+    return Speed(1.0 / median(durations[len(durations) // 3 :]), wanted)

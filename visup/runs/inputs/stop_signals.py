@@ -55,10 +55,10 @@ def stop_signals(*, at_once: bool = True, reload: bool = False) -> Iterator[Stop
     def note_reload(number: int, frame: FrameType | None) -> None:
         request.reload = True
 
-    here = threading.current_thread() is threading.main_thread()
-    heard = [n for n in SIGNALS if here and signal.getsignal(n) is not signal.SIG_IGN]
-    before = {number: signal.signal(number, receive) for number in heard}
-    if here and reload and hasattr(signal, "SIGHUP"):
+    in_main_thread = threading.current_thread() is threading.main_thread()
+    handled = [n for n in SIGNALS if in_main_thread and signal.getsignal(n) is not signal.SIG_IGN]
+    before = {number: signal.signal(number, receive) for number in handled}
+    if in_main_thread and reload and hasattr(signal, "SIGHUP"):
         before[signal.SIGHUP] = signal.signal(signal.SIGHUP, note_reload)
     try:
         yield request

@@ -50,14 +50,14 @@ def read_zones(text: str, path: str) -> tuple[Zone, ...]:
         SettingsError: It is no zone file.
         ErrorGroup: Several zones are not valid.
     """
-    entries, given = _entries(text, path)
-    ground = _ground(given, path)
-    h = None if ground is None else floor_map(ground)
+    entries, ground_value = _entries(text, path)
+    ground = _ground(ground_value, path)
+    to_floor = None if ground is None else floor_map(ground)
     zones: list[Zone] = []
     faults: list[VisupError] = []
     for number, entry in enumerate(entries, start=1):
         try:
-            zone = _zone(entry, f"{path}, zone {number}", h)
+            zone = _zone(entry, f"{path}, zone {number}", to_floor)
             if zone.name in (z.name for z in zones):
                 raise SettingsError(
                     f"two zones are called '{zone.name}'",
@@ -94,16 +94,16 @@ def _zone_text(zone: Zone) -> str:
     return f'[[zone]]\nname = "{zone.name}"\npolygon = [{corners}]\n{depth}'
 
 
-def _ground(given: object, path: str) -> Ground | None:
-    if given is None:
+def _ground(value: object, path: str) -> Ground | None:
+    if value is None:
         return None
-    where, table = f"{path}, ground", given if isinstance(given, dict) else {}
+    where, table = f"{path}, ground", value if isinstance(value, dict) else {}
     sides = [table.get(key) for key in ("image", "floor")]
     image, floor = (
         tuple(_pair(p) for p in side) if isinstance(side, list) else () for side in sides
     )
-    fine = len(image) == len(floor) >= 4 and all(image) and all(floor)
-    if not fine or set(table) - {"image", "floor"}:
+    valid = len(image) == len(floor) >= 4 and all(image) and all(floor)
+    if not valid or set(table) - {"image", "floor"}:
         raise SettingsError("the ground is invalid", where=where, expected=_GROUND)
     metres = tuple((Number(p[0], "m"), Number(p[1], "m")) for p in floor if p is not None)
     ground = Ground(tuple(p for p in image if p is not None), metres)
@@ -141,13 +141,13 @@ def _entries(text: str, path: str) -> tuple[list[Any], object]:
     return entries, ground
 
 
-def _zone(entry: object, where: str, h: Floats | None) -> Zone:
+def _zone(entry: object, where: str, to_floor: Floats | None) -> Zone:
     if not isinstance(entry, dict):
         raise SettingsError("this is not a zone", where=where, expected=_EXAMPLE)
-    strange = next((key for key in entry if key not in _KEYS), None)
-    if strange is not None:
+    unknown = next((key for key in entry if key not in _KEYS), None)
+    if unknown is not None:
         raise SettingsError(
-            f"'{strange}' is not known here", where=where, expected=f"one of: {', '.join(_KEYS)}"
+            f"'{unknown}' is not known here", where=where, expected=f"one of: {', '.join(_KEYS)}"
         )
     name = entry.get("name")
     if not isinstance(name, str) or not _NAME.fullmatch(name):
@@ -158,28 +158,31 @@ def _zone(entry: object, where: str, h: Floats | None) -> Zone:
         )
     where = f"{where} ('{name}')"
     if "floor" in entry:
-        floor = _polygon(entry["floor"], where, "metres", least=1e-6)
+        floor = _polygon(entry["floor"], where, "metres", min_area=1e-6)
         return Zone(
-            name, _in_image(floor, h, where), _depth(entry.get("depth"), where), on_floor=True
+            name,
+            _in_image(floor, to_floor, where),
+            _depth(entry.get("depth"), where),
+            on_floor=True,
         )
     return Zone(name, _polygon(entry.get("polygon"), where), _depth(entry.get("depth"), where))
 
 
 def _in_image(
-    floor: tuple[tuple[float, float], ...], h: Floats | None, where: str
+    floor: tuple[tuple[float, float], ...], to_floor: Floats | None, where: str
 ) -> tuple[tuple[float, float], ...]:
     """A polygon of the floor in image coordinates."""
-    if h is None:
+    if to_floor is None:
         what = "the zone is drawn on the floor, but nothing says where the floor is"
         raise SettingsError(what, where=where, expected=_GROUND)
-    corners = projected(floor, np.linalg.inv(h).astype(float))
+    corners = projected(floor, np.linalg.inv(to_floor).astype(float))
     return tuple((float(x), float(y)) for x, y in corners)
 
 
 def _polygon(
-    given: object, where: str, unit: str = "pixels", least: float = 1.0
+    value: object, where: str, unit: str = "pixels", min_area: float = 1.0
 ) -> tuple[tuple[float, float], ...]:
-    corners = given if isinstance(given, list) else []
+    corners = value if isinstance(value, list) else []
     points = tuple(_pair(c) for c in corners)
     if not all(points) or len(corners) < 3:
         raise SettingsError(
@@ -190,7 +193,7 @@ def _polygon(
             expected=f"at least three corners [x, y] in {unit}, in order",
         )
     polygon = tuple(p for p in points if p is not None)
-    if area(polygon) < least:
+    if area(polygon) < min_area:
         raise SettingsError(
             "the polygon encloses nothing", where=where, hint="give the corners in order"
         )
@@ -199,31 +202,31 @@ def _polygon(
 
 def area(polygon: tuple[tuple[float, float], ...]) -> float:
     """Area of a polygon, square pixels; 0 if its corners are collinear."""
-    turned = (*polygon[1:], polygon[0])
-    double = sum(a[0] * b[1] - a[1] * b[0] for a, b in zip(polygon, turned, strict=True))
+    following = (*polygon[1:], polygon[0])
+    double = sum(a[0] * b[1] - a[1] * b[0] for a, b in zip(polygon, following, strict=True))
     return abs(double) / 2.0
 
 
-def _depth(given: object, where: str) -> tuple[float, float] | None:
-    if given is None:
+def _depth(value: object, where: str) -> tuple[float, float] | None:
+    if value is None:
         return None
-    depth = _pair(given)
+    depth = _pair(value)
     if depth is None or not 0.0 <= depth[0] < depth[1]:
         raise SettingsError(
-            f"the range of depth is {given!r}",
+            f"the range of depth is {value!r}",
             where=where,
             expected="depth = [nearest, farthest] in the models' units, 0 <= nearest < farthest",
         )
     return depth
 
 
-def _pair(given: object) -> tuple[float, float] | None:
-    if not isinstance(given, list) or len(given) != 2:
+def _pair(value: object) -> tuple[float, float] | None:
+    if not isinstance(value, list) or len(value) != 2:
         return None
-    if any(isinstance(v, bool) or not isinstance(v, int | float) for v in given):
+    if any(isinstance(v, bool) or not isinstance(v, int | float) for v in value):
         return None
     try:
-        x, y = (float(v) for v in given)
+        x, y = (float(v) for v in value)
     except OverflowError:  # an integer with hundreds of digits
         return None
     return (x, y) if math.isfinite(x) and math.isfinite(y) else None

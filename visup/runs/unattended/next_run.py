@@ -20,7 +20,7 @@ from visup.runs.settings import RunOptions
 ROLLED = "rolled"
 """Value of the fact `ended` for a run followed by another, which `next_run` names."""
 
-TRY_AGAIN_S = 60.0
+RETRY_S = 60.0
 """Seconds between attempts to start the next run."""
 
 
@@ -53,8 +53,8 @@ class RollOver:
 
     def __init__(self, options: RunOptions) -> None:
         self._run_s, self._run_bytes = options.run_s, options.run_bytes
-        self._begun: float | None = None
-        self._not_before = 0.0
+        self._started: float | None = None
+        self._retry_at = 0.0
         self._closing: list[threading.Thread] = []
 
     def due(self, time_s: float, size: int) -> bool:
@@ -64,21 +64,21 @@ class RollOver:
             time_s: Time of the step, seconds of the source.
             size: Size of the journal, bytes.
         """
-        self._begun = time_s if self._begun is None else self._begun
-        if time_s < self._not_before:
+        self._started = time_s if self._started is None else self._started
+        if time_s < self._retry_at:
             return False
-        long = self._run_s is not None and time_s - self._begun >= self._run_s
+        long = self._run_s is not None and time_s - self._started >= self._run_s
         return long or (self._run_bytes is not None and size >= self._run_bytes)
 
     def begun(self, time_s: float) -> None:
         """Record that the next run has begun."""
-        self._begun = time_s
+        self._started = time_s
 
     def failed(self, time_s: float) -> None:
         """Record that it could not begin."""
-        self._not_before = time_s + TRY_AGAIN_S
+        self._retry_at = time_s + RETRY_S
 
-    def close_books(
+    def finish_files(
         self,
         recorder: Recorder,
         checkpoints: CheckpointWriter,

@@ -36,8 +36,8 @@ class PhaseMeter:
         self._over(Phase.PERCEIVE)
         for phase, outcome in agent.phases(observation):
             self._over(phase)
-            thought = outcome
-        step = agent.act(observation, thought)
+            last_outcome = outcome
+        step = agent.act(observation, last_outcome)
         self._over(Phase.ACT)
         for observer in agent.observers:
             observer(step, frame)

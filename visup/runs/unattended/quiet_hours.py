@@ -19,7 +19,7 @@ _DAYS = ("Mon", "Tue", "Wed", "Thu", "Fri", "Sat", "Sun")
 _DAY = f"({'|'.join(_DAYS)})"
 _PERIOD = re.compile(rf"(?:{_DAY}(?:-{_DAY})? )?(\d\d):(\d\d)-(\d\d):(\d\d)")
 _WHOLE_DAY = 24 * 60
-FORM = "22:00-06:00, Sat 12:00-24:00, or Sat-Sun 00:00-24:00"
+EXPECTED = "22:00-06:00, Sat 12:00-24:00, or Sat-Sun 00:00-24:00"
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,16 +58,18 @@ def quiet_period(text: str) -> QuietPeriod:
     Raises:
         SettingsError: It is malformed.
     """
-    told = _PERIOD.fullmatch(text.strip())
+    match = _PERIOD.fullmatch(text.strip())
     begin, end = (
-        (int(told[3]) * 60 + int(told[4]), int(told[5]) * 60 + int(told[6])) if told else (-1, -1)
+        (int(match[3]) * 60 + int(match[4]), int(match[5]) * 60 + int(match[6]))
+        if match
+        else (-1, -1)
     )
-    minutes_fine = told and int(told[4]) < 60 and int(told[6]) < 60
-    if not (told and minutes_fine and 0 <= begin < _WHOLE_DAY and 0 < end <= _WHOLE_DAY):
-        raise SettingsError(f"the quiet hours {text!r} cannot be read", expected=FORM)
-    first = _DAYS.index(told[1]) if told[1] else 0
-    last = _DAYS.index(told[2]) if told[2] else first
-    count = (last - first) % 7 + 1 if told[1] else 7
+    minutes_valid = match and int(match[4]) < 60 and int(match[6]) < 60
+    if not (match and minutes_valid and 0 <= begin < _WHOLE_DAY and 0 < end <= _WHOLE_DAY):
+        raise SettingsError(f"the quiet hours {text!r} cannot be read", expected=EXPECTED)
+    first = _DAYS.index(match[1]) if match[1] else 0
+    last = _DAYS.index(match[2]) if match[2] else first
+    count = (last - first) % 7 + 1 if match[1] else 7
     return QuietPeriod(frozenset((first + n) % 7 for n in range(count)), begin, end)
 
 
@@ -169,13 +171,13 @@ class QuietGate:
 
     def _released(self, step: Step, *, quiet: bool) -> Sequence[Alert]:
         """Held alerts that are sent now: quiet hours have ended, or they became critical."""
-        told = [
+        released = [
             a
             for a in step.mind.alerts
             if a.id in self._held and not (quiet and a.severity < Severity.CRITICAL)
         ]
-        self._held -= {a.id for a in told}
-        return told
+        self._held -= {a.id for a in released}
+        return released
 
     def _restore_held(self, step: Step) -> None:
         """Restore the alerts held by an earlier process: those opened in quiet hours that had not ended."""
