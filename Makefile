@@ -53,7 +53,7 @@ oracles: setup
 bench: setup
 	$(BIN)/python -m visup.evaluation.bench
 	$(BIN)/python -m tests.console.pace
-	test ! -d ../shared/data || $(BIN)/python -m tests.story ../shared/data/worlds ../shared/data/machines
+	test ! -d ../shared/data || $(BIN)/python -m tests.narrative ../shared/data/worlds ../shared/data/machines
 
 # The documentation as a site in site/; every warning is an error.
 docs: $(STAMP)

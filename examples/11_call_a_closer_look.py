@@ -36,7 +36,7 @@ class CloserLook:
 
 def main() -> None:
     """Two discs cross; the closer look is called as they come near."""
-    agent = build_agent(WatchSettings("clip"), more_behaviours=[CloserLook()])
+    agent = build_agent(WatchSettings("clip"), extra=[CloserLook()])
     before = None
     for shot in crossing(frames=90):
         step = agent.step(shot.frame)

@@ -67,7 +67,7 @@ def test_the_phases_of_a_step_tell_together_what_it_told(
     for number in (1, 2, 12, 40, 47, 60):
         records = asked.phases(number)
         assert [r.phase for r in records] == list(Phase)
-        told = [text for r in records for text in r.told]
+        told = [text for r in records for text in r.events]
         assert sorted(told) == sorted(e.text for e in steps[number - 1].events)
         seen = records[0].percepts
         assert seen["region"] == (3 if number <= 45 else 2)

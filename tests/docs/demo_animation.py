@@ -17,9 +17,9 @@ from rich.text import Text
 import visup
 from tests.paths import ROOT
 from visup.agent import Event, Severity
+from visup.narrative import Narrative
 from visup.report.image_text import write
 from visup.runs.demo import demo_settings
-from visup.story import Narrative
 from visup.terminal.narrator import verdict_line
 from visup.wording import prose
 

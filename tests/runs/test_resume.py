@@ -263,7 +263,7 @@ def test_a_disk_that_is_full_for_a_while_is_told_and_nothing_is_lost(
         return made[0]
 
     monkeypatch.setattr("visup.runs.recorder.Journal", shaky)
-    monkeypatch.setattr("visup.runs.recorder.TRY_AGAIN", 4)
+    monkeypatch.setattr("visup.runs.recorder.RETRY_STEPS", 4)
     result = supervise(clip, fresh_folder(tmp_path / "run", ""), options=BARE)
     run = Recording.open(tmp_path / "run")
     assert run.count() == result.steps == 40

@@ -1,4 +1,4 @@
-"""Conditions stop at exactly the steps at which a look at every step says that they should."""
+"""Conditions stop at exactly the steps at which an evaluation of every step says that they should."""
 
 from __future__ import annotations
 
@@ -69,12 +69,12 @@ def presence(mind: Mind) -> object:
 
 
 def holds(name: str, a: int, b: int) -> Callable[[Mind], bool]:
-    def look(mind: Mind) -> bool:
+    def evaluate(mind: Mind) -> bool:
         here = {x.id for x in mind.present()}
         found = mind.relation(name, a, b) if {a, b} <= here else None
         return found is not None and found.truth is Truth.TRUE
 
-    return look
+    return evaluate
 
 
 SCANS: dict[str, Scan] = {

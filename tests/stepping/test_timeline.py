@@ -150,8 +150,8 @@ def test_a_reasoner_that_raises_is_seen_inside_its_step() -> None:
     it.step(2)
     stopped = it.step(until="update")
     assert stopped.paused is not None
-    assert stopped.paused.thought is not None
-    assert [c.kind for c in stopped.paused.thought.conditions] == ["reasoning_failed"]
+    assert stopped.paused.outcome is not None
+    assert [c.kind for c in stopped.paused.outcome.conditions] == ["reasoning_failed"]
     step = it.step().step
     assert step is not None
     assert [a.kind for a in step.mind.alerts] == ["reasoning_failed"]

@@ -53,7 +53,7 @@ def test_a_branch_holds_to_its_belief_and_the_course_stays(belief: Assumption) -
         assert is_so(branch, belief)
     assert it.at == 30
     real: list[bytes] = []
-    it.step(20, tell=lambda step: real.append(told(step)))
+    it.step(20, on_step=lambda step: real.append(told(step)))
     assert real == list(reasoning_bytes()[30:50])
 
 
@@ -81,7 +81,7 @@ def test_a_branch_without_beliefs_is_the_very_course() -> None:
     it = at(17)
     branch = it.branch()
     made: list[bytes] = []
-    branch.step(30, tell=lambda step: made.append(told(step)))
+    branch.step(30, on_step=lambda step: made.append(told(step)))
     assert made == list(reasoning_bytes()[17:47])
     assert not branch.compare()
     assert it.at == 17

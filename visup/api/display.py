@@ -19,27 +19,27 @@ from visup.terminal.display import html_of
 from visup.terminal.narrator import event_row, verdict_line
 from visup.wording import worded_once
 
-MOST_EVENTS = 12
-MOST_ROWS = 10
+MAX_EVENTS = 12
+MAX_ROWS = 10
 
 
-def story(
+def run_summary(
     title: str, events: Iterable[Event], verdict: Verdict | None, *, has_task: bool
 ) -> RenderableType:
-    """A run as text: what it is about, the latest of what was told, the verdict so far.
+    """A run as text: title, latest events, verdict so far.
 
     Args:
-        title: What it is about.
-        events: All of its events.
-        verdict: As it stands.
-        has_task: Whether there is a task to judge.
+        title: What the text is about.
+        events: All events of the run.
+        verdict: The verdict so far.
+        has_task: Whether there is a task.
     """
-    told = worded_once(tuple(events))
-    head = [Text(f"{len(told) - MOST_EVENTS} earlier events", style="dim")]
+    lines = worded_once(tuple(events))
+    head = [Text(f"{len(lines) - MAX_EVENTS} earlier events", style="dim")]
     return Group(
         Text(title, style="bold"),
-        *(head if len(told) > MOST_EVENTS else ()),
-        *(event_row(e) for e in told[-MOST_EVENTS:]),
+        *(head if len(lines) > MAX_EVENTS else ()),
+        *(event_row(e) for e in lines[-MAX_EVENTS:]),
         Text.from_markup(verdict_line(verdict, has_task=has_task)),
     )
 
@@ -56,21 +56,21 @@ def html_with_picture(text: RenderableType, step: Step | None) -> str:
 
 def rows(title: str, records: Iterable[Any]) -> RenderableType:
     """The first of some records as a table, as wide as the terminal."""
-    several = list(islice(records, MOST_ROWS + 1))
+    several = list(islice(records, MAX_ROWS + 1))
     table = Table(title=title, title_justify="left", box=None, header_style="dim")
     names = _names(several[0]) if several else ()
     for name in names:
         table.add_column(name, no_wrap=name != "text", overflow="ellipsis")
-    for record in several[:MOST_ROWS]:
-        table.add_row(*(_short(getattr(record, name)) for name in names))
-    return Group(table, *([Text("...")] if len(several) > MOST_ROWS else []))
+    for record in several[:MAX_ROWS]:
+        table.add_row(*(_short_text(getattr(record, name)) for name in names))
+    return Group(table, *([Text("...")] if len(several) > MAX_ROWS else []))
 
 
 def _names(record: Any) -> tuple[str, ...]:
     return tuple(f.name for f in fields(record))[:8] if is_dataclass(record) else ()
 
 
-def _short(value: object) -> Text:
+def _short_text(value: object) -> Text:
     if isinstance(value, float):
         return Text(f"{value:.6g}")
     shown = value if isinstance(value, str | int | tuple) or value is None else type(value).__name__

@@ -17,7 +17,7 @@ from visup.agent.model.events import Alert, Event, Severity
 from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
 from visup.agent.model.task_beliefs import Verdict
 from visup.agent.storage.journal_reader import Recording
-from visup.api.display import story
+from visup.api.display import run_summary
 from visup.api.records import Records
 from visup.runs.resume import recorded_settings
 from visup.runs.settings import WatchSettings
@@ -142,14 +142,14 @@ class RecordedRun:
         return f"RecordedRun({str(self.folder)!r})"
 
     def __rich__(self) -> RenderableType:
-        return self._story()
+        return self._summary()
 
     def _repr_html_(self) -> str:
-        return html_of(self._story())
+        return html_of(self._summary())
 
-    def _story(self) -> RenderableType:
+    def _summary(self) -> RenderableType:
         has_task = bool(self.settings.tasks)
-        return story(str(self.folder), self.events, self.verdict, has_task=has_task)
+        return run_summary(str(self.folder), self.events, self.verdict, has_task=has_task)
 
     def _records(
         self, kind: type[Record], made: Callable[[Any], Record], lines: Iterable[Any]

@@ -19,16 +19,16 @@ from visup.agent.model.fast_replace import replace
 from visup.agent.model.records import Frame
 from visup.agent.model.step import Step
 from visup.agent.model.task_beliefs import Verdict
-from visup.api.display import html_with_picture, story, with_picture
+from visup.api.display import html_with_picture, run_summary, with_picture
 from visup.api.records import Records
 from visup.api.watch_options import TaskLike, WatchOptions, settings_from
+from visup.narrative import Narrative
 from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.redaction import redacted
 from visup.runs.result import RunResult
 from visup.runs.runner import Audience, fresh_folder, supervised
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import final_verdict
-from visup.story import Narrative
 
 KEPT_STEPS = 2000
 """Steps that a run keeps in memory, about 100 kB each; all events and alerts are kept."""
@@ -133,10 +133,10 @@ class Run(Iterator[Step]):
         return f"Run({redacted(self.settings.source)!r}, {state}, {len(self._events)} events)"
 
     def __rich__(self) -> RenderableType:
-        return with_picture(self._story(), self._last())
+        return with_picture(self._summary(), self._last())
 
     def _repr_html_(self) -> str:
-        return html_with_picture(self._story(), self._last())
+        return html_with_picture(self._summary(), self._last())
 
     def narrate(self) -> Iterator[Event]:
         """Watch the rest of the source, and yield notable events as they come.
@@ -200,10 +200,10 @@ class Run(Iterator[Step]):
     def _last(self) -> Step | None:
         return replace(self._steps[-1], frame=self._frame) if self._steps else None
 
-    def _story(self) -> RenderableType:
+    def _summary(self) -> RenderableType:
         state = "" if self.result else "; the run is under way" if self._begun else "; not started"
         verdict = self.result.verdict if self.result else self._verdict_so_far()
-        return story(
+        return run_summary(
             f"{redacted(self.settings.source)}{state}",
             self._events,
             verdict,

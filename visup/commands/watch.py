@@ -155,9 +155,9 @@ def run_and_report(
     """Run, printing the narrative as it goes and the verdict at the end."""
     from rich.markup import escape
 
+    from visup.narrative import Detail, Narrative
     from visup.runs.operator import HumanOperator, typed_lines
     from visup.runs.runner import Audience, fresh_folder, supervise
-    from visup.story import Detail, Narrative
     from visup.terminal.narrator import Narrator
 
     console = make_console()

@@ -16,6 +16,7 @@ from visup.agent import (
 )
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Step
+from visup.narrative import Narrative
 from visup.report.annotate import annotate
 from visup.report.bounded_buffers import Heaviest, SpanRecorder, Thinned
 from visup.report.crops import cut_out, jpeg_of, shrunk
@@ -30,7 +31,6 @@ from visup.report.records import (
     Sample,
 )
 from visup.rules.wording.sentences import role_or_model
-from visup.story import Narrative
 from visup.tasks.tools.outline import Branch
 from visup.wording import worded_once
 

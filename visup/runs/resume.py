@@ -230,7 +230,7 @@ def catch_up(
     on_step: Callable[[Step, Frame], None],
     on_recorded_step: Callable[[Step], None],
     *,
-    behaviours_restored: bool,
+    restored: bool,
 ) -> tuple[Iterator[Frame], tuple[str, ...]]:
     """Bring an agent to its state after the last recorded step.
 
@@ -240,7 +240,7 @@ def catch_up(
         past: The run.
         on_step: Receives recorded steps whose frames exist.
         on_recorded_step: Receives all recorded steps since the state.
-        behaviours_restored: Whether the behaviours were restored, too.
+        restored: Whether the behaviours were restored, too.
 
     Returns:
         The frames that follow, and notes for the user.
@@ -266,7 +266,7 @@ def catch_up(
         on_step(step, frame)
         on_recorded_step(step)
     notes = []
-    if not behaviours_restored and past.steps:
+    if not restored and past.steps:
         why = f" ({past.why_none})" if past.why_none else ""
         notes.append(f"All {past.steps} earlier frames were perceived again{why}.")
     if differing:

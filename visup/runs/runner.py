@@ -136,7 +136,7 @@ class _SupervisedRun:
         self._faults = RuntimeFaults()
         self._meter, self._roll_over = PhaseMeter(), RollOver(options)
         self.source = stack.enter_context(open_video(settings, options.span))
-        self._agent = build_agent(settings, more_behaviours=(self._faults,), live=self.source.live)
+        self._agent = build_agent(settings, extra=(self._faults,), live=self.source.live)
         stack.callback(self._agent.close)
         self._warnings = () if past else check_cast(settings, self._agent, answered=answered)
         # The bound actors are recorded, so that a replay, which has no models, knows them.
@@ -175,16 +175,10 @@ class _SupervisedRun:
 
     def catch_up(self, past: InterruptedRun) -> Iterator[Frame]:
         """Restore the agent, and return the remaining frames."""
-        past, behaviours_restored = self._load_state(past)
+        past, restored = self._load_state(past)
         on_step = self._recorder.catch_up if self._recorder else lambda step, frame: None
-        on_recorded_step = self._sinks.alerts.late
         frames, notes = catch_up(
-            self._agent,
-            self.source,
-            past,
-            on_step,
-            on_recorded_step,
-            behaviours_restored=behaviours_restored,
+            self._agent, self.source, past, on_step, self._sinks.alerts.late, restored=restored
         )
         self._notes = (*self._notes, *notes)
         return frames
@@ -203,9 +197,7 @@ class _SupervisedRun:
             return past, self._agent.load(past.state.agent)
         except Exception as fault:
             self._agent.close()
-            self._agent = build_agent(
-                self._settings, more_behaviours=(self._faults,), live=self.source.live
-            )
+            self._agent = build_agent(self._settings, extra=(self._faults,), live=self.source.live)
             self._stack.callback(self._agent.close)
             if self._recorder:
                 self._recorder.restart_report()
@@ -223,10 +215,8 @@ class _SupervisedRun:
         answering = (self._attending(audience.operator, past),) if audience.operator else ()
         # Evidence comes before the sinks, which link to it.
         evidence = (self._evidence,) if self._evidence else ()
-        answer_box = (
-            (AnswerBox(self._agent, lambda: self._folder, audience.notice),) if recording else ()
-        )
-        after_recording = (*audience.observers, *evidence, self._sinks, *answering, *answer_box)
+        box = (AnswerBox(self._agent, lambda: self._folder, audience.notice),) if recording else ()
+        after_recording = (*audience.observers, *evidence, self._sinks, *answering, *box)
         clocked = (self._stamp,) if self.source.live else ()
         self._agent.observers = (self._alarms, *clocked, *recording, *after_recording)
         for warning in self._warnings:
@@ -395,8 +385,7 @@ class _SupervisedRun:
         answers = {**past.answers, **operator.answers} if past else operator.answers
         applied = self._agent.mind.answers
         pending = {i: name for i, name in answers.items() if i not in applied}
-        pending_operator = replace(operator, answers=pending)
-        return pending_operator.attend(self._agent, at_once=past is not None)
+        return replace(operator, answers=pending).attend(self._agent, at_once=past is not None)
 
 
 def notify(sinks: Sinks, notice: Callable[[str], None] | None) -> Callable[[str], None]:

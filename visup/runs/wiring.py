@@ -102,7 +102,7 @@ def _every(settings: WatchSettings, fps: float) -> int:
 def build_agent(
     settings: WatchSettings,
     observers: Sequence[Observer] = (),
-    more_behaviours: Sequence[Behaviour] = (),
+    extra: Sequence[Behaviour] = (),
     *,
     live: bool = False,
 ) -> Agent:
@@ -111,7 +111,7 @@ def build_agent(
     Args:
         settings: Settings of the run.
         observers: Receive each step.
-        more_behaviours: Behaviours besides those of the settings.
+        extra: Behaviours besides those of the settings.
         live: Whether the source is live, so that a hanging behaviour must be reported soon.
 
     Raises:
@@ -134,7 +134,7 @@ def build_agent(
         ),
         *([ColourBehaviour()] if any(map(asks_for_colour, tasks)) else []),
         *(signals := signal_behaviours(settings.signals)),
-        *more_behaviours,
+        *extra,
     ]
     contracts = [b.contract for b in behaviours]
     check_signals(contracts, signals, _rules(settings), tasks)

@@ -50,10 +50,10 @@ def parse_condition(
     first, _, rest = what.strip().partition(" ")
     reader = _READERS.get(first) if rest else None
     names = names or known_names(mind)
-    return reader(rest.strip(), names) if reader else _guessed(what.strip(), names)
+    return reader(rest.strip(), names) if reader else _inferred(what.strip(), names)
 
 
-def _guessed(word: str, names: Names) -> StopCondition:
+def _inferred(word: str, names: Names) -> StopCondition:
     """The condition of a word without its kind."""
     try:
         return TimeStop(float(word))
@@ -74,20 +74,20 @@ def _guessed(word: str, names: Names) -> StopCondition:
 
 def _unknown_word(word: str, names: Names) -> SettingsError:
     """The error for an unknown word; taking it for an event would wait for a typing error until the end."""
-    near = did_you_mean(word, [*EVENT_KINDS, *names.stages, *names.rules, *Phase])
-    own = f"for an event of your own: event {word}" if word.isidentifier() else None
+    suggestion = did_you_mean(word, [*EVENT_KINDS, *names.stages, *names.rules, *Phase])
+    event_hint = f"for an event of your own: event {word}" if word.isidentifier() else None
     return SettingsError(
         f"'{word}' is not known",
         expected="a phase, event, rule, stage, object, time, frame or expression",
-        hint=near or own,
+        hint=suggestion or event_hint,
     )
 
 
 def _rule(text: str, names: Names) -> StopCondition:
-    name, _, more = text.partition(" ")
+    name, _, rest = text.partition(" ")
     if names.rules and name not in names.rules:
         raise _unknown("rule", name, names.rules)
-    return RuleStop(name, more.strip() == "changes")
+    return RuleStop(name, rest.strip() == "changes")
 
 
 def _stage(name: str, names: Names) -> StopCondition:

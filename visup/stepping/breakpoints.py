@@ -94,14 +94,14 @@ class RuleStop:
 class _VerdictCache:
     """Caches the verdicts of two minds: the mind after a step is the one before the next."""
 
-    _known: list[tuple[Mind, Mapping[tuple[int, ...], Truth]]] = field(default_factory=list)
+    _entries: list[tuple[Mind, Mapping[tuple[int, ...], Truth]]] = field(default_factory=list)
 
     def of(self, mind: Mind, rule: str) -> Mapping[tuple[int, ...], Truth]:
-        for known, found in self._known:
-            if known is mind:
-                return found
-        self._known = [*self._known[-1:], (mind, rule_verdicts(mind, rule))]
-        return self._known[-1][1]
+        for cached, verdicts_of_mind in self._entries:
+            if cached is mind:
+                return verdicts_of_mind
+        self._entries = [*self._entries[-1:], (mind, rule_verdicts(mind, rule))]
+        return self._entries[-1][1]
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,7 +184,7 @@ class WhenStop:
 
     expression: Expression
     changes: bool = False
-    _follow: ExpressionMonitor = field(
+    _monitor: ExpressionMonitor = field(
         default_factory=lambda: ExpressionMonitor(), compare=False, repr=False
     )
 
@@ -195,7 +195,7 @@ class WhenStop:
 
     def met(self, before: Mind, step: Step) -> str:
         """See `StopCondition`."""
-        was, now = self._follow(self.expression, before, step.mind)
+        was, now = self._monitor(self.expression, before, step.mind)
         changes = self.changes or self.expression.quantity
         if not changes:
             truths = {k: v for k, v in now.truths.items() if isinstance(v, Truth)}
@@ -207,7 +207,7 @@ class WhenStop:
         old_verdicts = {r.objects: str(r) for r in was.readings}
         return next(
             (
-                f"{self.expression.text} {_of(ids)}: {old_verdicts.get(ids, 'nothing')} -> {text}"
+                f"{self.expression.text} {_arguments(ids)}: {old_verdicts.get(ids, 'nothing')} -> {text}"
                 for ids, text in new_verdicts.items()
                 if text != old_verdicts.get(ids)
             ),
@@ -220,17 +220,17 @@ class ExpressionMonitor:
     """Evaluates an expression from mind to mind; restarts at a mind that does not follow the last one."""
 
     mind: Mind | None = None
-    judged: ExpressionResult | None = None
+    result: ExpressionResult | None = None
 
     def __call__(
         self, expression: Expression, before: Mind, after: Mind
     ) -> tuple[ExpressionResult | None, ExpressionResult]:
         """Its values before and after a step."""
         if before is not self.mind:
-            self.judged = expression.judge(before) if before.frame_index >= 0 else None
-        was = self.judged
-        self.mind, self.judged = after, expression.judge(after, was)
-        return was, self.judged
+            self.result = expression.judge(before) if before.frame_index >= 0 else None
+        was = self.result
+        self.mind, self.result = after, expression.judge(after, was)
+        return was, self.result
 
 
 @dataclass(frozen=True, slots=True)
@@ -283,11 +283,11 @@ def _change_text(
         # Rules are unknown for objects that have vanished, and were unknown for new ones.
         old, new = was.get(ids, Truth.UNKNOWN), now.get(ids, Truth.UNKNOWN)
         if old is not new and (changes or new is Truth.TRUE):
-            return f"{name}{_of(ids)} is {new.value} (was {old.value})"
+            return f"{name}{_arguments(ids)} is {new.value} (was {old.value})"
     return ""
 
 
-def _of(ids: tuple[int, ...]) -> str:
+def _arguments(ids: tuple[int, ...]) -> str:
     return f"({', '.join(map(str, ids))})" if ids else ""
 
 

@@ -17,13 +17,13 @@ class PausedStep:
 
     Attributes:
         phase: The last completed phase.
-        seen: The observation.
-        thought: Conclusions so far, with an unfinished mind; None after `perceive`.
+        observation: The observation.
+        outcome: Conclusions so far, with an unfinished mind; None after `perceive`.
     """
 
     phase: Phase
-    seen: Observation
-    thought: Outcome | None = None
+    observation: Observation
+    outcome: Outcome | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

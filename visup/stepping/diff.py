@@ -71,16 +71,16 @@ class MindDiff:
 
 def mind_diff(first: Mind, second: Mind) -> MindDiff:
     """The differences between two minds."""
-    relations = _true(first) | _true(second)
-    was, now = ({**dict(_facts(m)), **_truths(m, relations)} for m in (first, second))
-    order = sorted({*was, *now}, key=lambda key: (_ORDER.index(key[0]), key[1]))
+    relations = _true_relations(first) | _true_relations(second)
+    before, after = ({**dict(_belief_texts(m)), **_truths(m, relations)} for m in (first, second))
+    order = sorted({*before, *after}, key=lambda key: (_ORDER.index(key[0]), key[1]))
     return MindDiff(
         (first.frame_index, second.frame_index),
         (first.time, second.time),
         tuple(
-            MindChange(*key, was.get(key), now.get(key))
+            MindChange(*key, before.get(key), after.get(key))
             for key in order
-            if was.get(key) != now.get(key)
+            if before.get(key) != after.get(key)
         ),
     )
 
@@ -104,7 +104,7 @@ _ORDER = (
 )
 
 
-def _facts(mind: Mind) -> Iterator[tuple[Key, str]]:
+def _belief_texts(mind: Mind) -> Iterator[tuple[Key, str]]:
     """The beliefs of a mind as texts by topic and item."""
     yield ("camera", "health"), mind.health.status.value
     for kind in sorted(mind.unknown):
@@ -121,21 +121,21 @@ def _facts(mind: Mind) -> Iterator[tuple[Key, str]]:
     for object_id, name in mind.answers.items():
         yield ("answer", f"object {object_id}"), name
     for kind, percepts in mind.percepts.items():
-        yield ("percept", kind), _short("; ".join(str(p.value) for p in percepts))
+        yield ("percept", kind), _shortened("; ".join(str(p.value) for p in percepts))
 
 
 def _of_object(b: ObjectBelief) -> Iterator[tuple[Key, str]]:
-    who = f"object {b.id}"
-    yield ("object", who), b.presence.value if b.confirmed else f"{b.presence.value}, unconfirmed"
+    item = f"object {b.id}"
+    yield ("object", item), b.presence.value if b.confirmed else f"{b.presence.value}, unconfirmed"
     named = ", ".join(f"{c.name} {c.confidence:.2f}" for c in b.candidates)
-    yield ("identity", who), named or f"{b.name} {b.unknown:.2f}"
+    yield ("identity", item), named or f"{b.name} {b.unknown:.2f}"
     if b.pose is not None:
         spin = f", {b.pose.spin.rate:.0f} deg/s" if b.pose.spin else ""
-        yield ("pose", who), f"{b.pose.name} view {b.pose.view}{spin}"
+        yield ("pose", item), f"{b.pose.name} view {b.pose.view}{spin}"
     x, y, w, h = b.region.bbox
     depth = "" if b.depth is None else f", depth {b.depth:.1f}"
     speed = ", ".join(f"{v:.0f}" for v in b.region.velocity)
-    yield ("measured", who), f"box {x},{y} {w}x{h}, ({speed}) px/s{depth}"
+    yield ("measured", item), f"box {x},{y} {w}x{h}, ({speed}) px/s{depth}"
 
 
 def _of_tasks(mind: Mind) -> Iterator[tuple[Key, str]]:
@@ -148,14 +148,14 @@ def _of_tasks(mind: Mind) -> Iterator[tuple[Key, str]]:
             yield ("actor", f"{task.task}.{b.actor}"), who
 
 
-def _true(mind: Mind) -> frozenset[tuple[str, tuple[int, ...]]]:
+def _true_relations(mind: Mind) -> frozenset[tuple[str, tuple[int, ...]]]:
     """The true relations among the listed ones."""
     return frozenset((r.name, r.objects) for r in mind.relations if r.truth is Truth.TRUE)
 
 
-def _truths(mind: Mind, wanted: frozenset[tuple[str, tuple[int, ...]]]) -> dict[Key, str]:
+def _truths(mind: Mind, relations: frozenset[tuple[str, tuple[int, ...]]]) -> dict[Key, str]:
     """The truth of relations, without those not evaluated."""
-    found = {key: mind.relation(key[0], *key[1]) for key in wanted}
+    found = {key: mind.relation(key[0], *key[1]) for key in relations}
     return {("relation", _call(*key)): r.truth.value for key, r in found.items() if r is not None}
 
 
@@ -163,8 +163,8 @@ def _call(name: str, objects: tuple[int, ...]) -> str:
     return f"{name}({', '.join(map(str, objects))})"
 
 
-def _short(text: str, most: int = 60) -> str:
-    return text if len(text) <= most else f"{text[: most - 3]}..."
+def _shortened(text: str, max_length: int = 60) -> str:
+    return text if len(text) <= max_length else f"{text[: max_length - 3]}..."
 
 
 enable_display(MindChange, MindDiff)

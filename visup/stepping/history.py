@@ -46,10 +46,10 @@ class StepHistory:
     spacing: int = SPACING
     latest: int = LATEST
     _minds: dict[int, AgentSnapshot] = field(default_factory=dict, init=False)
-    _whole: OrderedDict[int, tuple[Step, AgentSnapshot]] = field(
+    _cached: OrderedDict[int, tuple[Step, AgentSnapshot]] = field(
         default_factory=OrderedDict, init=False
     )
-    _told: list[tuple[tuple[Event, ...], tuple[Alert, ...]]] = field(
+    _reported: list[tuple[tuple[Event, ...], tuple[Alert, ...]]] = field(
         default_factory=list, init=False
     )
 
@@ -63,11 +63,11 @@ class StepHistory:
         Args:
             agent: The agent in its state here.
         """
-        answers = {n: given for n, given in self.answers.items() if n >= self.at}
+        answers = {n: names for n, names in self.answers.items() if n >= self.at}
         return StepHistory(agent, self.observations, self.at, answers, self.spacing, self.latest)
 
     @property
-    def here(self) -> AgentSnapshot:
+    def present(self) -> AgentSnapshot:
         """The present state of the agent."""
         return self.agent.snapshot()
 
@@ -76,26 +76,26 @@ class StepHistory:
         self._note_answers()
         return self.agent.phases(observation, self.answers.get(self.at, {}))
 
-    def conclude(self, observation: Observation, thought: Outcome) -> Step:
+    def conclude(self, observation: Observation, outcome: Outcome) -> Step:
         """The last phase of the next step."""
-        step = self.agent.act(observation, thought)
+        step = self.agent.act(observation, outcome)
         self.at += 1
-        was = self.agent.snapshot()
+        state = self.agent.snapshot()
         if self.at > self.made:
             self.made = self.at
-            self._told.append((step.events, step.alerts))
+            self._reported.append((step.events, step.alerts))
             if (self.at - self.begin) % self.spacing == 0:
-                self._minds[self.at] = was
-        self._whole[self.at] = step, was
-        if len(self._whole) > self.latest:
-            self._whole.popitem(last=False)
+                self._minds[self.at] = state
+        self._cached[self.at] = step, state
+        if len(self._cached) > self.latest:
+            self._cached.popitem(last=False)
         return step
 
     def forward(self) -> Step:
         """Make the next step on the stored observations."""
-        seen = self.observations.seen(self.at)
-        *_, (_, thought) = self.phases(seen)
-        return self.conclude(seen, thought)
+        observation = self.observations.observation(self.at)
+        *_, (_, outcome) = self.phases(observation)
+        return self.conclude(observation, outcome)
 
     def go(self, number: int) -> Step | None:
         """Move to the position after step `number`, which must have been made.
@@ -105,62 +105,64 @@ class StepHistory:
         """
         self._note_answers()
         step = None
-        near = max(n for n in (*self._minds, *self._whole) if n <= number)
-        if not near < self.at < number:
-            step = self._take_up(near)
+        nearest = max(n for n in (*self._minds, *self._cached) if n <= number)
+        if not nearest < self.at < number:
+            step = self._restore_nearest(nearest)
         while self.at < number:
             step = self.forward()
         return step
 
     def step(self, number: int) -> Step | None:
         """Step `number`, without moving there; None at the beginning of the timeline."""
-        with self.elsewhere():
+        with self.position_kept():
             return self.go(number)
 
     def snapshot(self, number: int) -> AgentSnapshot:
         """The state of the agent after step `number`."""
-        with self.elsewhere():
+        with self.position_kept():
             self.go(number)
-            return self.here
+            return self.present
 
     @contextmanager
-    def elsewhere(self) -> Iterator[None]:
+    def position_kept(self) -> Iterator[None]:
         """A context that restores the position afterwards."""
-        at, was = self.at, self.here
+        at, state = self.at, self.present
         try:
             yield
         finally:
             self.at = at
-            self.agent.restore(was)
+            self.agent.restore(state)
 
-    def jump(self, number: int, was: AgentSnapshot) -> None:
+    def jump(self, number: int, state: AgentSnapshot) -> None:
         """Move to the position after step `number`, given the agent's state there."""
         self._note_answers()
         self.at = number
-        self.agent.restore(was)
+        self.agent.restore(state)
 
     def events(self, first: int = 1, last: int | None = None) -> Iterator[tuple[int, Event]]:
         """All events from step `first` to `last`, each with the number of its step."""
         end = self.made if last is None else min(last, self.made)
         for number in range(max(first, self.begin + 1), end + 1):
-            for event in self._told[number - self.begin - 1][0]:
+            for event in self._reported[number - self.begin - 1][0]:
                 yield number, event
 
     def _note_answers(self) -> None:
         """Store the operator's answers since the latest step, before the agent's state changes."""
-        if self.at == self.made and (said := self.here.answers):
-            self.answers[self.at] = {**self.answers.get(self.at, {}), **said}
+        if self.at == self.made and (answers := self.present.answers):
+            self.answers[self.at] = {**self.answers.get(self.at, {}), **answers}
 
-    def _take_up(self, number: int) -> Step | None:
+    def _restore_nearest(self, number: int) -> Step | None:
         """Move to a cached step or stored mind."""
-        step, was = self._whole.get(number) or (None, self._minds[number])
+        step, state = self._cached.get(number) or (None, self._minds[number])
         self.at = number
-        self.agent.restore(was)
+        self.agent.restore(state)
         if number == self.begin:
             return None
         if step is not None:
-            self._whole.move_to_end(number)
+            self._cached.move_to_end(number)
             return step
-        events, alerts = self._told[number - self.begin - 1]
-        seen, mind = self.observations.seen(number - 1), was.mind
-        return Step(mind.frame_index, mind.time, seen, mind, events, alerts, was.directives)
+        events, alerts = self._reported[number - self.begin - 1]
+        observation, mind = self.observations.observation(number - 1), state.mind
+        return Step(
+            mind.frame_index, mind.time, observation, mind, events, alerts, state.directives
+        )

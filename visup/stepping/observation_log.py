@@ -20,21 +20,21 @@ class ObservationLog:
     Observations that the codec does not support (values of plug-ins) are stored unchanged.
     """
 
-    _seen: list[bytes | Observation] = field(default_factory=list)
+    _stored: list[bytes | Observation] = field(default_factory=list)
 
     def __len__(self) -> int:
-        return len(self._seen)
+        return len(self._stored)
 
     def add(self, observation: Observation) -> None:
         """Add an observation."""
-        told = to_document(observation)
-        lost = any("lost" in report for report in told["reports"])
-        packed = zlib.compress(to_json(told, inf_nan_mode="constants"), _LEVEL)
-        self._seen.append(observation if lost else packed)
+        document = to_document(observation)
+        incomplete = any("lost" in report for report in document["reports"])
+        packed = zlib.compress(to_json(document, inf_nan_mode="constants"), _LEVEL)
+        self._stored.append(observation if incomplete else packed)
 
-    def seen(self, number: int) -> Observation:
+    def observation(self, number: int) -> Observation:
         """The observation after step `number`."""
-        kept = self._seen[number]
+        kept = self._stored[number]
         if isinstance(kept, Observation):
             return kept
         return from_document(from_json(zlib.decompress(kept)))

@@ -16,12 +16,12 @@ class StepInput:
     """The input of the next step.
 
     Attributes:
-        seen: The observation.
+        observation: The observation.
         answers: The operator's answers before it in a recorded run; None if not recorded.
         frame: The frame, or None.
     """
 
-    seen: Observation
+    observation: Observation
     answers: Mapping[int, str] | None = None
     frame: Frame | None = None
 
@@ -51,22 +51,26 @@ class RecordedObservations:
     """Observations and answers from the journal of a run."""
 
     def __init__(self, recording: Recording) -> None:
-        self._seen: Iterator[Observation] = recording.observations()
+        self._observations: Iterator[Observation] = recording.observations()
         self._answers = recording.answers()
 
     def next(self, agent: Agent) -> StepInput | None:
         """See `ObservationSource`."""
-        seen = next(self._seen, None)
-        return None if seen is None else StepInput(seen, self._answers.get(seen.frame_index, {}))
+        observation = next(self._observations, None)
+        return (
+            None
+            if observation is None
+            else StepInput(observation, self._answers.get(observation.frame_index, {}))
+        )
 
 
 class ScriptedObservations:
     """Given observations, such as scripted ones."""
 
-    def __init__(self, seen: Iterable[Observation]) -> None:
-        self._seen = iter(seen)
+    def __init__(self, observations: Iterable[Observation]) -> None:
+        self._observations = iter(observations)
 
     def next(self, agent: Agent) -> StepInput | None:
         """See `ObservationSource`."""
-        seen = next(self._seen, None)
-        return None if seen is None else StepInput(seen)
+        observation = next(self._observations, None)
+        return None if observation is None else StepInput(observation)

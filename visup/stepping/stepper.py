@@ -66,7 +66,7 @@ class Stepper(Timeline):
         super().__init__(agent, frames)
         self.breakpoints: dict[int, Breakpoint] = {}
         self.watches: dict[int, WatchExpression] = {}
-        self._ahead = False
+        self._extending = False
 
     @classmethod
     def of_run(cls, run: Path | Recording, **changed: Any) -> Stepper:
@@ -88,7 +88,7 @@ class Stepper(Timeline):
         self,
         n: int | None = None,
         until: str | Phase | Predicate | StopCondition | None = None,
-        tell: Callable[[Step], None] | None = None,
+        on_step: Callable[[Step], None] | None = None,
     ) -> StepResult:
         """Make some steps, or step until a condition holds; breakpoints also stop it.
 
@@ -96,7 +96,7 @@ class Stepper(Timeline):
             n: Maximum number of steps; by default 1 without `until`, else unlimited. A step inside which it
                 is stopped counts when it is completed.
             until: See `visup.stepping.breakpoint_parser.parse_condition`.
-            tell: Receives each completed step.
+            on_step: Receives each completed step.
 
         Returns:
             Where and why it ended.
@@ -104,30 +104,30 @@ class Stepper(Timeline):
         Raises:
             SettingsError: `until` is not valid.
         """
-        goal = (self._condition(until),) if until is not None else ()
-        most = n if n is not None or goal else 1
-        stops = (*goal, *(b.stop for b in self.breakpoints.values() if b.enabled))
+        goals = (self._condition(until),) if until is not None else ()
+        limit = n if n is not None or goals else 1
+        stops = (*goals, *(b.stop for b in self.breakpoints.values() if b.enabled))
         phases = frozenset(s.phase for s in stops if isinstance(s, PhaseStop))
         done: list[Step] = []
         taken = 0
-        while most is None or taken < most:
+        while limit is None or taken < limit:
             before = self.agent.mind
             step = self._cycle(phases)
             if step is None:
-                halted = self._paused
-                why = (f"after {halted.phase.value}",) if halted else ()
-                return StepResult(taken, tuple(done), why, halted, halted is None)
+                paused = self._paused
+                why = (f"after {paused.phase.value}",) if paused else ()
+                return StepResult(taken, tuple(done), why, paused, paused is None)
             taken += 1
-            if tell:
-                tell(step)
+            if on_step:
+                on_step(step)
             done = [*done[1 - self._history.latest :], step]
-            if reasons := self._reasons(goal, before, step):
+            if reasons := self._reasons(goals, before, step):
                 return StepResult(taken, tuple(done), reasons)
         return StepResult(taken, tuple(done))
 
-    def _reasons(self, goal: Sequence[StopCondition], before: Mind, step: Step) -> tuple[str, ...]:
+    def _reasons(self, goals: Sequence[StopCondition], before: Mind, step: Step) -> tuple[str, ...]:
         """Reasons to stop after a step; every condition is evaluated, since some have state."""
-        found = [s.met(before, step) for s in goal]
+        found = [s.met(before, step) for s in goals]
         for b in self.breakpoints.values():
             if b.enabled and (why := b.stop.met(before, step)):
                 b.hits += 1
@@ -136,27 +136,27 @@ class Stepper(Timeline):
         return tuple(filter(None, found))
 
     def _after(self, before: Mind, step: Step) -> None:
-        for watch in () if self._ahead else tuple(self.watches.values()):
-            watch.look(before, step.mind)
+        for watch in () if self._extending else tuple(self.watches.values()):
+            watch.evaluate(before, step.mind)
 
-    def _look_ahead(self) -> bool:
-        self._ahead = True
+    def _extend(self) -> bool:
+        self._extending = True
         try:
-            return super()._look_ahead()
+            return super()._extend()
         finally:
-            self._ahead = False
+            self._extending = False
 
-    def _look_again(self) -> None:
+    def _position_changed(self) -> None:
         for watch in self.watches.values() if self.mind.frame_index >= 0 else ():
-            watch.look(self.mind, self.mind)
+            watch.evaluate(self.mind, self.mind)
 
     # Breakpoints and watches
 
     def break_at(self, what: str | Phase | Predicate | StopCondition) -> Breakpoint:
         """Set a breakpoint; see `visup.stepping.breakpoint_parser.parse_condition`."""
-        made = Breakpoint(max(self.breakpoints, default=0) + 1, self._condition(what))
-        self.breakpoints[made.id] = made
-        return made
+        breakpoint = Breakpoint(max(self.breakpoints, default=0) + 1, self._condition(what))
+        self.breakpoints[breakpoint.id] = breakpoint
+        return breakpoint
 
     @property
     def names(self) -> Names:
@@ -198,11 +198,11 @@ class Stepper(Timeline):
         Raises:
             RuleError: It is not valid.
         """
-        made = WatchExpression.of(max(self.watches, default=0) + 1, text, breaks)
+        expression = WatchExpression.of(max(self.watches, default=0) + 1, text, breaks)
         if self.mind.frame_index >= 0:
-            made.look(self.mind, self.mind)
-        self.watches[made.id] = made
-        return made
+            expression.evaluate(self.mind, self.mind)
+        self.watches[expression.id] = expression
+        return expression
 
     def unwatch(self, number: int) -> None:
         """Delete a watch.
@@ -217,7 +217,7 @@ class Stepper(Timeline):
     # Branches
 
     @property
-    def may_answer(self) -> bool:
+    def can_answer(self) -> bool:
         """Whether the operator can answer here: at the end of a timeline that is not recorded."""
         return self.at == self.made and not isinstance(self._source, RecordedObservations)
 
@@ -227,7 +227,7 @@ class Stepper(Timeline):
         Raises:
             SettingsError: Later steps were made, or there is no such object or name.
         """
-        if not self.may_answer:
+        if not self.can_answer:
             recorded = isinstance(self._source, RecordedObservations)
             other = "later steps were taken without this answer"
             what = "the operator of a recorded run can no longer answer" if recorded else other
@@ -245,13 +245,15 @@ class Stepper(Timeline):
         """
         reasoners = reasoners or self.agent.reasoners
         other = replace_agent(self.agent, assuming_reasoners(reasoners, assumptions))
-        here = self._history.here
-        swapped = reasoners.match != self.agent.reasoners.match
-        mind = with_assumptions(without_tasks(here.mind) if swapped else here.mind, assumptions)
-        other.restore(replace(here, mind=mind))
-        made = Stepper(self._history.branch(other), self)
-        made._last = self._last
-        return made
+        present = self._history.present
+        tasks_changed = reasoners.match != self.agent.reasoners.match
+        mind = with_assumptions(
+            without_tasks(present.mind) if tasks_changed else present.mind, assumptions
+        )
+        other.restore(replace(present, mind=mind))
+        branched = Stepper(self._history.branch(other), self)
+        branched._last = self._last
+        return branched
 
     def compare(self) -> TranscriptDiff:
         """The difference of events between this branch and its parent over the same steps.
@@ -265,7 +267,7 @@ class Stepper(Timeline):
         parent = self.parent
         if parent is None:
             raise SettingsError("this is not a branch: there is nothing to compare it with")
-        while parent.made < self.at and parent._look_ahead():
+        while parent.made < self.at and parent._extend():
             continue  # the parent was stopped inside a step that this branch has made
         first, last = self.begin + 1, self.at
         return transcript_diff(
@@ -275,8 +277,8 @@ class Stepper(Timeline):
 
     def diff(self, first: int, second: int | None = None) -> MindDiff:
         """The differences between the minds after two steps; the second is here by default."""
-        there = self.mind if second is None else self.mind_at(second)
-        return mind_diff(self.mind_at(first), there)
+        after = self.mind if second is None else self.mind_at(second)
+        return mind_diff(self.mind_at(first), after)
 
     # Explanations
 
@@ -302,10 +304,12 @@ class Stepper(Timeline):
         Raises:
             VisupError: It cannot be explained.
         """
-        made = self.at > self.begin
-        before = self.mind_at(self.at - 1) if made else None
-        seen = self.observation_at(self.at) if made else None
-        return asking.why_not(LastStep(self.mind, before, seen, tuple(self.agent.reasoners)), text)
+        stepped = self.at > self.begin
+        before = self.mind_at(self.at - 1) if stepped else None
+        observation = self.observation_at(self.at) if stepped else None
+        return asking.why_not(
+            LastStep(self.mind, before, observation, tuple(self.agent.reasoners)), text
+        )
 
     def close(self) -> None:
         """Release the resources of the agent's behaviours."""

@@ -33,7 +33,7 @@ class Timeline:
         self._history = history
         self._frame: Frame | None = None
         self._paused: PausedStep | None = None
-        self._rest: Iterator[tuple[Phase, Outcome]] = iter(())
+        self._remaining_phases: Iterator[tuple[Phase, Outcome]] = iter(())
         self._last: Step | None = None
 
     # Position
@@ -41,8 +41,8 @@ class Timeline:
     @property
     def mind(self) -> Mind:
         """The mind here; unfinished if stopped inside a step."""
-        thought = self._paused.thought if self._paused else None
-        return self.agent.mind if thought is None else thought.mind
+        outcome = self._paused.outcome if self._paused else None
+        return self.agent.mind if outcome is None else outcome.mind
 
     @property
     def at(self) -> int:
@@ -75,20 +75,23 @@ class Timeline:
         """Run to the end of a step; None if stopped inside it, or if the source has ended."""
         before = self.agent.mind
         if self._paused is None:
-            seen = self._perceived()
-            if seen is None:
+            observation = self._perceived()
+            if observation is None:
                 return None
-            self._paused, self._rest = PausedStep(Phase.PERCEIVE, seen), self._history.phases(seen)
+            self._paused, self._remaining_phases = (
+                PausedStep(Phase.PERCEIVE, observation),
+                self._history.phases(observation),
+            )
             if Phase.PERCEIVE in phases:
                 return None
         paused = self._paused
-        for phase, thought in self._rest:
-            self._paused = paused = PausedStep(phase, paused.seen, thought)
+        for phase, outcome in self._remaining_phases:
+            self._paused = paused = PausedStep(phase, paused.observation, outcome)
             if phase in phases:
                 return None
-        assert paused.thought is not None
-        step = self._history.conclude(paused.seen, paused.thought)
-        self._arrive(step)
+        assert paused.outcome is not None
+        step = self._history.conclude(paused.observation, paused.outcome)
+        self._move_to(step)
         frame, self._frame = self._frame, None
         for observer in self.agent.observers if frame is not None else ():
             assert frame is not None
@@ -103,44 +106,44 @@ class Timeline:
         """The observation of the next step: stored, or new from the source."""
         history = self._history
         if history.at < len(history.observations):
-            return history.observations.seen(history.at)
+            return history.observations.observation(history.at)
         if self.parent is not None:
             while len(history.observations) <= history.at:
-                if not self.parent._look_ahead():
+                if not self.parent._extend():
                     return None
-            if said := self.parent._history.answers.get(history.at):
-                history.answers[history.at] = said
-            return history.observations.seen(history.at)
-        given = self._source.next(self.agent) if self._source else None
-        if given is None:
+            if answers := self.parent._history.answers.get(history.at):
+                history.answers[history.at] = answers
+            return history.observations.observation(history.at)
+        step_input = self._source.next(self.agent) if self._source else None
+        if step_input is None:
             return None
-        history.observations.add(given.seen)
-        if given.answers is not None:
-            history.answers[history.at] = given.answers
-        self._frame = given.frame
-        return given.seen
+        history.observations.add(step_input.observation)
+        if step_input.answers is not None:
+            history.answers[history.at] = step_input.answers
+        self._frame = step_input.frame
+        return step_input.observation
 
-    def _look_ahead(self) -> bool:
+    def _extend(self) -> bool:
         """Extend this timeline by a step for a branch; the position is kept."""
-        place = self._paused, self._rest, self._last
+        position = self._paused, self._remaining_phases, self._last
         made = self.made
-        with self._history.elsewhere():
-            self._drop()
+        with self._history.position_kept():
+            self._discard_unfinished()
             self._last = self._history.go(made)
             self._cycle(frozenset())
-        self._paused, self._rest, self._last = place
+        self._paused, self._remaining_phases, self._last = position
         return self.made > made
 
-    def _look_again(self) -> None:
+    def _position_changed(self) -> None:
         """Called when the position has changed other than by a step."""
 
-    def _arrive(self, step: Step | None) -> None:
-        self._drop()
+    def _move_to(self, step: Step | None) -> None:
+        self._discard_unfinished()
         self._last = step
 
-    def _drop(self) -> None:
+    def _discard_unfinished(self) -> None:
         """Discard the unfinished step, if any; its observation stays recorded."""
-        self._paused, self._rest = None, iter(())
+        self._paused, self._remaining_phases = None, iter(())
 
     # Back
 
@@ -170,13 +173,13 @@ class Timeline:
             raise SettingsError(
                 f"there is no step {number}", expected=f"at least {self.begin}, where this began"
             )
-        place = self.snapshot()
-        self._arrive(self._history.go(min(number, self.made)))
+        position = self.snapshot()
+        self._move_to(self._history.go(min(number, self.made)))
         while self.at < number:
             if self._cycle(frozenset()) is None:
-                self.restore(place)
+                self.restore(position)
                 raise SettingsError(f"there is no step {number}", expected=f"at most {self.made}")
-        self._look_again()
+        self._position_changed()
         return self._last
 
     def go_to_time(self, seconds: float) -> Step | None:
@@ -187,8 +190,8 @@ class Timeline:
         """
         before = self.snapshot()
         made = range(self.begin + 1, self.made + 1)
-        place = bisect_left(made, seconds, key=lambda n: self.observation_at(n).time)
-        self.go(made[place] if place < len(made) else self.made)
+        index = bisect_left(made, seconds, key=lambda n: self.observation_at(n).time)
+        self.go(made[index] if index < len(made) else self.made)
         while self.mind.time < seconds or self.at == self.begin:
             if self._cycle(frozenset()) is None:
                 end = self.mind.time
@@ -196,12 +199,12 @@ class Timeline:
                 raise SettingsError(
                     f"the source ends before {seconds:g} s", expected=f"at most {end:.2f} s"
                 )
-        self._look_again()
+        self._position_changed()
         return self._last
 
     def snapshot(self) -> Bookmark:
         """This position, for `restore`; a few references, no copy."""
-        return Bookmark(self.at, self._history.here, self._history)
+        return Bookmark(self.at, self._history.present, self._history)
 
     def restore(self, mark: Bookmark) -> None:
         """Return to the position of a snapshot.
@@ -213,9 +216,9 @@ class Timeline:
             raise SettingsError(
                 "this snapshot is of another timeline", expected="one of this stepper"
             )
-        self._arrive(self._history.step(mark.number) if mark.number > self.begin else None)
+        self._move_to(self._history.step(mark.number) if mark.number > self.begin else None)
         self._history.jump(mark.number, mark.snapshot)
-        self._look_again()
+        self._position_changed()
 
     # Past steps
 
@@ -244,4 +247,4 @@ class Timeline:
 
     def observation_at(self, number: int) -> Observation:
         """The observation of a step; numbers begin at 1 and include the steps before a branch."""
-        return self._history.observations.seen(number - 1)
+        return self._history.observations.observation(number - 1)

@@ -39,14 +39,14 @@ class WatchExpression:
         id: Number, from 1.
         stop: The expression; also the condition that it changes.
         breaks: Whether a change stops stepping.
-        judged: Result after the latest step, or None.
+        result: Result after the latest step, or None.
     """
 
     id: int
     stop: WhenStop
     breaks: bool = False
-    judged: ExpressionResult | None = None
-    _follow: ExpressionMonitor = field(default_factory=ExpressionMonitor, repr=False)
+    result: ExpressionResult | None = None
+    _monitor: ExpressionMonitor = field(default_factory=ExpressionMonitor, repr=False)
 
     @classmethod
     def of(cls, number: int, text: str, breaks: bool) -> WatchExpression:
@@ -66,13 +66,13 @@ class WatchExpression:
     def readings(self) -> tuple[ExpressionValue, ...]:
         """Its values, one per assignment of objects; symmetric ones once."""
         found: dict[tuple[tuple[int, ...], str], ExpressionValue] = {}
-        for reading in self.judged.readings if self.judged else ():
+        for reading in self.result.readings if self.result else ():
             found.setdefault((tuple(sorted(reading.objects)), str(reading)), reading)
         return tuple(found.values())
 
-    def look(self, before: Mind, after: Mind) -> None:
+    def evaluate(self, before: Mind, after: Mind) -> None:
         """Evaluate it after a step."""
-        _, self.judged = self._follow(self.stop.expression, before, after)
+        _, self.result = self._monitor(self.stop.expression, before, after)
 
     def changed(self, before: Mind, step: Step) -> str:
         """How its value has changed, or an empty text; call it after each step."""

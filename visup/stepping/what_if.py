@@ -59,8 +59,8 @@ class AssumedRelation:
             return mind
         found = mind.relation(self.name, *self.objects)
         if found is None or found.truth is not self.truth:
-            told = Relation(self.name, self.objects, self.truth, self.since)
-            mind = replace(mind, relations=with_relation(mind.relations, told))
+            assumed = Relation(self.name, self.objects, self.truth, self.since)
+            mind = replace(mind, relations=with_relation(mind.relations, assumed))
         return self._coupled(mind) if self.name == "coupled" else mind
 
     def _coupled(self, mind: Mind) -> Mind:
@@ -86,9 +86,9 @@ class AssumedIdentity:
         belief = mind.objects.get(self.object_id)
         if belief is None or (belief.name == self.name and belief.confidence == 1.0):
             return mind
-        nobody = self.name == UNKNOWN_OBJECT
-        names = () if nobody else (Candidate(self.name, 0.0, 1.0, 1.0),)
-        return mind.with_objects(replace(belief, candidates=names, unknown=float(nobody)))
+        unidentified = self.name == UNKNOWN_OBJECT
+        names = () if unidentified else (Candidate(self.name, 0.0, 1.0, 1.0),)
+        return mind.with_objects(replace(belief, candidates=names, unknown=float(unidentified)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,8 +116,10 @@ class AssumingReasoner:
     def __call__(self, mind: Mind, observation: Observation) -> Outcome:
         """See `Reasoner`."""
         outcome = self.reasoner(mind, observation)
-        told = tuple(e for e in outcome.events if not any(_contradicts(b, e) for b in self.beliefs))
-        return replace(outcome, mind=with_assumptions(outcome.mind, self.beliefs), events=told)
+        events = tuple(
+            e for e in outcome.events if not any(_contradicts(b, e) for b in self.beliefs)
+        )
+        return replace(outcome, mind=with_assumptions(outcome.mind, self.beliefs), events=events)
 
 
 def _contradicts(belief: Assumption, event: Event) -> bool:
@@ -148,17 +150,17 @@ def assuming_reasoners(reasoners: Reasoners, beliefs: Sequence[Assumption]) -> R
 
 def with_rules(reasoners: Reasoners, rules: Sequence[Rule]) -> Reasoners:
     """Reasoners with other rules."""
-    kept = tuple(t for t in reasoners.cogitate if not isinstance(t, RuleReasoner))
+    others = tuple(t for t in reasoners.cogitate if not isinstance(t, RuleReasoner))
     early = any(t.early for t in reasoners.cogitate if isinstance(t, RuleReasoner))
-    return replace(reasoners, cogitate=(*kept, RuleReasoner(tuple(rules), early=early)))
+    return replace(reasoners, cogitate=(*others, RuleReasoner(tuple(rules), early=early)))
 
 
 def with_tasks(reasoners: Reasoners, tasks: Sequence[Task]) -> Reasoners:
     """Reasoners with other tasks, from their beginnings."""
-    kept = tuple(
+    others = tuple(
         t for t in reasoners.match if getattr(t, "__module__", "") != task_reasoner.__module__
     )
-    return replace(reasoners, match=(*((task_reasoner(tasks),) if tasks else ()), *kept))
+    return replace(reasoners, match=(*((task_reasoner(tasks),) if tasks else ()), *others))
 
 
 def without_tasks(mind: Mind) -> Mind:
@@ -168,40 +170,40 @@ def without_tasks(mind: Mind) -> Mind:
 
 
 def with_relation(
-    relations: RelationTable | tuple[Relation, ...], told: Relation
+    relations: RelationTable | tuple[Relation, ...], assumed: Relation
 ) -> RelationTable | tuple[Relation, ...]:
     """Relations with one replaced as assumed."""
     if not isinstance(relations, RelationTable):
-        return (*_others(relations, told), told)
+        return (*_others(relations, assumed), assumed)
     for number, cells in enumerate(relations.parts):
-        if told.name in cells.columns.named:
-            k, row = relations.pair(*told.objects) if len(told.objects) == 2 else (-1, 0)
+        if assumed.name in cells.columns.named:
+            k, row = relations.pair(*assumed.objects) if len(assumed.objects) == 2 else (-1, 0)
             if k < 0:
                 return relations
             parts = list(relations.parts)
-            parts[number] = _with_cell(cells, told, row, k)
+            parts[number] = _with_cell(cells, assumed, row, k)
             return replace(relations, parts=tuple(parts))
-    return replace(relations, extra=(*_others(relations.extra, told), told))
+    return replace(relations, extra=(*_others(relations.extra, assumed), assumed))
 
 
-def _others(relations: Iterable[Relation], told: Relation) -> tuple[Relation, ...]:
-    who = frozenset(told.objects)
-    return tuple(r for r in relations if r.name != told.name or frozenset(r.objects) != who)
+def _others(relations: Iterable[Relation], assumed: Relation) -> tuple[Relation, ...]:
+    objects = frozenset(assumed.objects)
+    return tuple(r for r in relations if r.name != assumed.name or frozenset(r.objects) != objects)
 
 
-def _with_cell(cells: RelationBlock, told: Relation, row: int, k: int) -> RelationBlock:
-    column, code = cells.columns.named[told.name]
-    if told.truth is Truth.UNKNOWN:
+def _with_cell(cells: RelationBlock, assumed: Relation, row: int, k: int) -> RelationBlock:
+    column, code = cells.columns.named[assumed.name]
+    if assumed.truth is Truth.UNKNOWN:
         code = UNKNOWN_CODE
-    elif told.truth is Truth.FALSE:
+    elif assumed.truth is Truth.FALSE:
         others = [c for c in range(len(column.names)) if c != code]
         # Prefer a code without a name, which implies nothing else; otherwise an adjacent one.
         code = min(others, key=lambda c: (column.names[c] != "", abs(c - code)))
     state, since, at = cells.state.copy(), cells.since.copy(), column.rows[row]
-    state[at, k], since[at, k] = code, told.since
+    state[at, k], since[at, k] = code, assumed.since
     # The confidence row may be shared with other columns: this one gets a row of its own.
     numbers = np.concatenate([cells.numbers, cells.numbers[column.confidence][None]])
-    numbers[-1, k] = told.confidence
-    own = replace(column, confidence=len(numbers) - 1)
-    each = tuple(own if c is column else c for c in cells.columns.each)
-    return RelationBlock(ColumnLayout(each), state, since, numbers)
+    numbers[-1, k] = assumed.confidence
+    own_row = replace(column, confidence=len(numbers) - 1)
+    layout = tuple(own_row if c is column else c for c in cells.columns.each)
+    return RelationBlock(ColumnLayout(layout), state, since, numbers)

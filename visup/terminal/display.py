@@ -281,8 +281,8 @@ def _(record: MindChange) -> RenderableType:
 
 @shown.register
 def _(record: PausedStep) -> RenderableType:
-    head = f"inside frame {record.seen.frame_index}, after {record.phase.value}"
-    told = record.thought.events if record.thought else ()
+    head = f"inside frame {record.observation.frame_index}, after {record.phase.value}"
+    told = record.outcome.events if record.outcome else ()
     return Group(Text(head, style="bold"), *(event_row(e) for e in told))
 
 

@@ -11,8 +11,8 @@ from rich.text import Text
 from visup.agent import Event, Frame, Severity, Verdict
 from visup.agent.model.step import Step
 from visup.agent.storage.jsonable import event_record
+from visup.narrative import Narrative, summary_lines
 from visup.runs.result import RunResult
-from visup.story import Narrative, summary_lines
 from visup.terminal.console import echo_json
 from visup.wording import prose
 
@@ -62,7 +62,7 @@ class Narrator:
             return
         for event in self.narrative.rest(self.last.time, self.last.frame_index):
             self.print_event(event)
-        for text in summary_lines(self.narrative.log, self.narrative.courses):
+        for text in summary_lines(self.narrative.log, self.narrative.paths):
             self.console.print(text, soft_wrap=True, markup=False)
 
     def print_event(self, event: Event) -> None:

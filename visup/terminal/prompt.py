@@ -41,7 +41,7 @@ _WORDS: Mapping[str, Words] = {
         *_names(s),
     ],
     "why": lambda s: [
-        *("not", *asking.ABOUT, *asking.NOT_YET),
+        *("not", *asking.WHY_TOPICS, *asking.WHY_NOT_TOPICS),
         *_names(s),
         *RELATION_NAMES,
         *_objects(s),

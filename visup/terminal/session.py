@@ -332,7 +332,7 @@ class Session:
         if number is None or len(words) < 2:
             return refusal("usage: answer ID NAME, such as: answer 2 arm")
         name = " ".join(words[1:])
-        if not self.stepper.may_answer:
+        if not self.stepper.can_answer:
             branch = self.stepper.branch()
             branch.answer(number, name)
             return self._enter_branch(branch)

@@ -54,7 +54,7 @@ def number_in(words: Words) -> int | None:
 def observation_of(stepper: Stepper) -> Observation | None:
     """The percepts of this step."""
     if stepper.paused is not None:
-        return stepper.paused.seen
+        return stepper.paused.observation
     return None if stepper.last is None else stepper.last.observation
 
 

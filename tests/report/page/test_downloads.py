@@ -1,4 +1,4 @@
-"""Tables to download from the page, and the lives of objects."""
+"""Tables to download from the page, and the table of objects."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from tests.report.page.test_html import data
 from visup.agent import Alert, Severity
 from visup.report.page.downloads import csv_bytes, downloads, parquet_bytes, tables_of
-from visup.report.page.lives import MOST_LIVES, lives
+from visup.report.page.object_table import MAX_ROWS, object_table
 from visup.report.page.sections import FEW_FRAMES, MANY_OBJECTS, alert_filter, shown_frames
 from visup.report.records import KeyFrame, ReportedObject, RunData
 
@@ -74,15 +74,15 @@ def crowd(count: int) -> RunData:
     return RunData("road.mp4", duration=40.0, objects=objects, key_frames=frames)
 
 
-def test_where_many_come_and_go_their_lives_take_the_place_of_pictures() -> None:
-    few, many = crowd(MANY_OBJECTS), crowd(MOST_LIVES + 30)
+def test_with_many_objects_their_table_replaces_pictures() -> None:
+    few, many = crowd(MANY_OBJECTS), crowd(MAX_ROWS + 30)
     assert len(shown_frames(few)) == 24
     shown = shown_frames(many)
     assert len(shown) == FEW_FRAMES
     assert [k.time for k in shown] == sorted(k.time for k in shown)
     assert min(k.weight for k in shown) == 4 - (FEW_FRAMES > 4)
-    assert lives(many).count("<tr>") == MOST_LIVES + 1  # and one of headings
-    assert "30 more are in the table" in lives(many)
+    assert object_table(many).count("<tr>") == MAX_ROWS + 1  # and one of headings
+    assert "30 more are in the table" in object_table(many)
 
 
 def test_only_a_longer_list_of_alerts_has_a_filter() -> None:

@@ -151,7 +151,7 @@ def test_what_is_no_condition_about_an_object_is_refused_with_its_place(conditio
         activation_rules([Contract("lens", gives=("detail",), awake=condition)])
     assert "contract of 'lens'" in str(told.value)
     with pytest.raises(BehaviourError):
-        build_agent(WatchSettings("clip"), more_behaviours=[Lens(awake=condition)])
+        build_agent(WatchSettings("clip"), extra=[Lens(awake=condition)])
 
 
 def test_what_safety_rules_read_is_given_by_someone_who_never_sleeps() -> None:
@@ -164,7 +164,7 @@ def test_what_safety_rules_read_is_given_by_someone_who_never_sleeps() -> None:
         always_active([sleeper], parse_rules('rule r(a): info when moving(a) say "{a}"'))
         == frozenset()
     )
-    agent = build_agent(WatchSettings("clip"), more_behaviours=[Lens(awake=NEAR)])
+    agent = build_agent(WatchSettings("clip"), extra=[Lens(awake=NEAR)])
     assert agent.limits.never_asleep == frozenset()
 
 

@@ -9,7 +9,7 @@ from visup.agent import Hypothesis, Region
 from visup.agent.model.errors import VisupError
 from visup.stepping import Stepper
 from visup.stepping.explanations.evidence import Why
-from visup.stepping.explanations.why import REPORTED
+from visup.stepping.explanations.why import REPORTED_HEADING
 from visup.terminal.display import html, shown
 
 
@@ -59,7 +59,7 @@ def test_why_has_its_reasons_and_its_percepts(it: Stepper, text: str) -> None:
 
 
 def test_a_stage_is_explained_with_what_was_last_reported_of_it(it: Stepper) -> None:
-    reported = next(w for w in it.why("approach").walk() if w.text == REPORTED)
+    reported = next(w for w in it.why("approach").walk() if w.text == REPORTED_HEADING)
     assert reported.parts
     assert all("Stage 'approach'" in w.line() for w in reported.parts)
 

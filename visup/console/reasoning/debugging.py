@@ -43,13 +43,13 @@ class PhaseRecord:
         phase: The phase.
         percepts: Kind -> number of percepts.
         changes: Changes of belief by the phase.
-        told: Texts of its events.
+        events: Texts of its events.
     """
 
     phase: Phase
     percepts: Mapping[str, int] = field(default_factory=dict)
     changes: tuple[MindChange, ...] = ()
-    told: tuple[str, ...] = ()
+    events: tuple[str, ...] = ()
 
 
 def stop_conditions(stepper: Stepper, words: Sequence[str]) -> AnyStop:
@@ -67,16 +67,16 @@ def stop_conditions(stepper: Stepper, words: Sequence[str]) -> AnyStop:
 
 
 def _condition(stepper: Stepper, words: str) -> StopCondition:
-    made = parse_condition(words, stepper.mind, stepper.names)
-    if isinstance(made, PhaseStop):
+    condition = parse_condition(words, stepper.mind, stepper.names)
+    if isinstance(condition, PhaseStop):
         raise SettingsError(
             f"'{words}' is over in every step", hint="the phases of a step are listed below"
         )
-    return made
+    return condition
 
 
 def searched(
-    stepper: Stepper, number: int, until: AnyStop, given_up: Callable[[], bool]
+    stepper: Stepper, number: int, until: AnyStop, cancelled: Callable[[], bool]
 ) -> Iterator[FoundStop]:
     """Step on until a condition is met; yields the position after each chunk, finally the one found.
 
@@ -84,10 +84,10 @@ def searched(
         stepper: Stepper of the run; others may move it between two chunks.
         number: Number of the step.
         until: The condition.
-        given_up: Whether the search was cancelled.
+        cancelled: Whether the search was cancelled.
     """
     at, found = number, False
-    while not found and not given_up():
+    while not found and not cancelled():
         if stepper.at != at or stepper.paused is not None:
             stepper.go(at)
         result = stepper.step(CHUNK, until)
@@ -107,29 +107,31 @@ def phases_of(stepper: Stepper, number: int) -> tuple[PhaseRecord, ...]:
     """
     stepper.go(number)  # raises if the step does not exist yet
     stepper.go(number - 1)
-    mind, told, records = stepper.mind, 0, []
+    mind, reported_events, records = stepper.mind, 0, []
     for phase in Phase:
         result = stepper.step(1, until=phase)
         if result.paused is None:
             break
-        if (thought := result.paused.thought) is None:
-            records.append(_perceived(result.paused))
+        if (outcome := result.paused.outcome) is None:
+            records.append(_perceive_record(result.paused))
             continue
-        records.append(_thought(phase, mind, thought, told))
-        mind, told = thought.mind, len(thought.events)
+        records.append(_reasoning_record(phase, mind, outcome, reported_events))
+        mind, reported_events = outcome.mind, len(outcome.events)
     step = stepper.last
     if step is not None and stepper.at == number:
         changes = mind_diff(mind, step.mind).changes
-        texts = tuple(e.text for e in step.events[told:])
-        records.append(PhaseRecord(Phase.ACT, changes=changes, told=texts))
+        texts = tuple(e.text for e in step.events[reported_events:])
+        records.append(PhaseRecord(Phase.ACT, changes=changes, events=texts))
     return tuple(records)
 
 
-def _perceived(paused: PausedStep) -> PhaseRecord:
-    kinds = Counter(p.kind for r in paused.seen.reports for p in r.percepts)
+def _perceive_record(paused: PausedStep) -> PhaseRecord:
+    kinds = Counter(p.kind for r in paused.observation.reports for p in r.percepts)
     return PhaseRecord(Phase.PERCEIVE, dict(kinds))
 
 
-def _thought(phase: Phase, before: Mind, thought: Outcome, told: int) -> PhaseRecord:
-    texts = tuple(e.text for e in thought.events[told:])
-    return PhaseRecord(phase, changes=mind_diff(before, thought.mind).changes, told=texts)
+def _reasoning_record(
+    phase: Phase, before: Mind, outcome: Outcome, first_event: int
+) -> PhaseRecord:
+    texts = tuple(e.text for e in outcome.events[first_event:])
+    return PhaseRecord(phase, changes=mind_diff(before, outcome.mind).changes, events=texts)

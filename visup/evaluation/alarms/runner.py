@@ -19,10 +19,10 @@ from visup.agent.storage.journal_reader import JOURNAL, Recording
 from visup.evaluation.figures import Progress, silent
 from visup.evaluation.health.runner import find_sources
 from visup.evaluation.missions.files import read_json
+from visup.narrative import Narrative
 from visup.runs.replay import replay, settings_for
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import build_agent, open_video
-from visup.story import Narrative
 
 
 @dataclass(slots=True)

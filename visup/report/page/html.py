@@ -18,7 +18,7 @@ from visup.report.page.figures import (
     stage_figure,
     vote_figures,
 )
-from visup.report.page.lives import lives
+from visup.report.page.object_table import object_table
 from visup.report.page.player import player
 from visup.report.page.shell import filled_page, write_page
 from visup.report.page.summary import title_of, verdict_words
@@ -38,7 +38,7 @@ PARTS: Mapping[str, Callable[[RunData], str]] = MappingProxyType(
         "player": player,
         "alert_filter": sections.alert_filter,
         "alerts": sections.alerts,
-        "lives": lives,
+        "objects": object_table,
         "key_frames": sections.key_frames,
         "tasks": sections.tasks,
         "courses": courses,

@@ -110,13 +110,11 @@ def percept_text(value: object) -> str:
             box = f"{w}x{h} at {x},{y}"
             return f"region {value.id}, {box}, confidence {value.confidence:.2f}"
         case Hypothesis():
-            looks = f"view {value.view} of {value.name}, similarity {value.similarity:.2f}"
-            return f"that region {value.region_id} looks like {looks}"
+            view = f"view {value.view} of {value.name}, similarity {value.similarity:.2f}"
+            return f"that region {value.region_id} looks like {view}"
         case Depth():
-            far = f"{value.depth:.1f} ± {value.sigma:.1f}"
-            return (
-                f"that region {value.region_id}, if it is {value.name}, is {far} model units away"
-            )
+            distance = f"{value.depth:.1f} ± {value.sigma:.1f}"
+            return f"that region {value.region_id}, if it is {value.name}, is {distance} model units away"
         case Health():
             return f"camera {value.status.value}" + (f": {value.detail}" if value.detail else "")
         case float():

@@ -16,9 +16,18 @@ from visup.stepping.explanations.evidence import Why
 from visup.stepping.explanations.why import ReasonFinder
 from visup.stepping.explanations.why_not import LastStep
 
-ABOUT = ("alert", "object", "identity", "relation", "rule", "stage", "verdict")
+WHY_TOPICS = ("alert", "object", "identity", "relation", "rule", "stage", "verdict")
 """First words of `why` questions."""
-NOT_YET = ("entry", "exit", "occlusion", "reappearance", "identified", "coupled", "rule", "stage")
+WHY_NOT_TOPICS = (
+    "entry",
+    "exit",
+    "occlusion",
+    "reappearance",
+    "identified",
+    "coupled",
+    "rule",
+    "stage",
+)
 """First words of `why not` questions, besides relations and names of rules and stages."""
 _PRESENCE = {
     "exit": Presence.LEFT,
@@ -32,7 +41,7 @@ class ParsedQuestion:
     """A parsed question.
 
     Attributes:
-        about: One of `ABOUT` or `NOT_YET`.
+        about: One of `WHY_TOPICS` or `WHY_NOT_TOPICS`.
         name: Name of a rule, relation, stage or task; may be empty.
         ids: Numbers of an alert or of objects.
     """
@@ -48,17 +57,17 @@ def why(reasons: ReasonFinder, text: str) -> Why:
     Raises:
         VisupError: The question is not valid, or its subject does not exist.
     """
-    asked = _parsed(text, reasons.mind, ABOUT)
+    question = _parse_question(text, reasons.mind, WHY_TOPICS)
     answers: dict[str, Callable[[], Why]] = {
-        "alert": lambda: reasons.alert(_single_id(asked, reasons.mind)),
-        "object": lambda: reasons.object(_single_id(asked, reasons.mind)),
-        "identity": lambda: reasons.identity(_single_id(asked, reasons.mind)),
-        "relation": lambda: reasons.relation(asked.name, asked.ids),
-        "rule": lambda: reasons.rule(asked.name, asked.ids),
-        "stage": lambda: reasons.stage(asked.name),
-        "verdict": lambda: reasons.verdict(asked.name or None),
+        "alert": lambda: reasons.alert(_single_id(question, reasons.mind)),
+        "object": lambda: reasons.object(_single_id(question, reasons.mind)),
+        "identity": lambda: reasons.identity(_single_id(question, reasons.mind)),
+        "relation": lambda: reasons.relation(question.name, question.ids),
+        "rule": lambda: reasons.rule(question.name, question.ids),
+        "stage": lambda: reasons.stage(question.name),
+        "verdict": lambda: reasons.verdict(question.name or None),
     }
-    return answers[asked.about]()
+    return answers[question.about]()
 
 
 def why_not(step: LastStep, text: str) -> Why:
@@ -68,29 +77,29 @@ def why_not(step: LastStep, text: str) -> Why:
         VisupError: The question is not valid, or its subject does not exist.
     """
     mind = step.mind
-    asked = _parsed(text, mind, (*NOT_YET, "relation"))
-    if asked.about in _PRESENCE:
-        wanted = _PRESENCE[asked.about]
-        return whynot.presence_unmet(step, _single_id(asked, mind), wanted)
+    question = _parse_question(text, mind, (*WHY_NOT_TOPICS, "relation"))
+    if question.about in _PRESENCE:
+        presence = _PRESENCE[question.about]
+        return whynot.presence_unmet(step, _single_id(question, mind), presence)
     answers: dict[str, Callable[[], Why]] = {
-        "entry": lambda: whynot.entry_unmet(step, _single_id(asked, mind)),
-        "identified": lambda: whynot.identity_unmet(step, _single_id(asked, mind)),
-        "coupled": lambda: whynot.coupling_unmet(step, *_two_ids(asked)),
-        "rule": lambda: whynot.alert_unmet(mind, asked.name, asked.ids),
-        "stage": lambda: whynot.stage_unmet(mind, asked.name),
-        "relation": lambda: whynot.relation_unmet(mind, asked.name, asked.ids),
+        "entry": lambda: whynot.entry_unmet(step, _single_id(question, mind)),
+        "identified": lambda: whynot.identity_unmet(step, _single_id(question, mind)),
+        "coupled": lambda: whynot.coupling_unmet(step, *_two_ids(question)),
+        "rule": lambda: whynot.alert_unmet(mind, question.name, question.ids),
+        "stage": lambda: whynot.stage_unmet(mind, question.name),
+        "relation": lambda: whynot.relation_unmet(mind, question.name, question.ids),
     }
-    return answers[asked.about]()
+    return answers[question.about]()
 
 
-def _parsed(text: str, mind: Mind, known: tuple[str, ...]) -> ParsedQuestion:
+def _parse_question(text: str, mind: Mind, known: tuple[str, ...]) -> ParsedQuestion:
     """`alert 2`, `relation touching 1 2`, `touching(1, 2)`, `captured`, ..."""
     words = re.findall(r"[^\s,()?]+", text)
     ids = tuple(int(w) for w in words if w.isdecimal())
     names = [w for w in words if not w.isdecimal()]
     about = names[0] if names else ""
     if about in known:
-        return _complete(ParsedQuestion(about, names[1] if len(names) > 1 else "", ids), text)
+        return _checked(ParsedQuestion(about, names[1] if len(names) > 1 else "", ids), text)
     for kind, table in (
         ("stage", stage_names(mind)),
         ("rule", rule_names(mind)),
@@ -106,26 +115,28 @@ def _parsed(text: str, mind: Mind, known: tuple[str, ...]) -> ParsedQuestion:
     )
 
 
-def _complete(asked: ParsedQuestion, text: str) -> ParsedQuestion:
-    if asked.about in ("relation", "rule", "stage") and not asked.name:
-        raise SettingsError(f"'{text}' names no {asked.about}", expected=f"{asked.about} NAME ...")
-    return asked
-
-
-def _single_id(asked: ParsedQuestion, mind: Mind) -> int:
-    """The number in a question; if there is only one alert or object, that one."""
-    if asked.ids:
-        return asked.ids[0]
-    there = [a.id for a in mind.alerts] if asked.about == "alert" else sorted(mind.objects)
-    if len(there) == 1:
-        return there[0]
-    numbers = ", ".join(map(str, there)) or "there is none"
-    raise SettingsError(f"which {asked.about}?", expected=numbers)
-
-
-def _two_ids(asked: ParsedQuestion) -> tuple[int, int]:
-    if len(asked.ids) != 2:
+def _checked(question: ParsedQuestion, text: str) -> ParsedQuestion:
+    if question.about in ("relation", "rule", "stage") and not question.name:
         raise SettingsError(
-            f"'{asked.about}' is about two objects", expected="such as: coupled 1 2"
+            f"'{text}' names no {question.about}", expected=f"{question.about} NAME ..."
         )
-    return asked.ids[0], asked.ids[1]
+    return question
+
+
+def _single_id(question: ParsedQuestion, mind: Mind) -> int:
+    """The number in a question; if there is only one alert or object, that one."""
+    if question.ids:
+        return question.ids[0]
+    candidates = [a.id for a in mind.alerts] if question.about == "alert" else sorted(mind.objects)
+    if len(candidates) == 1:
+        return candidates[0]
+    numbers = ", ".join(map(str, candidates)) or "there is none"
+    raise SettingsError(f"which {question.about}?", expected=numbers)
+
+
+def _two_ids(question: ParsedQuestion) -> tuple[int, int]:
+    if len(question.ids) != 2:
+        raise SettingsError(
+            f"'{question.about}' is about two objects", expected="such as: coupled 1 2"
+        )
+    return question.ids[0], question.ids[1]

@@ -34,11 +34,11 @@ from visup.stepping.explanations.evidence import (
     region_percepts,
 )
 
-LOOK_BACK = 250
+MAX_STEPS_BACK = 250
 """Steps to search backwards for the latest percepts that identify an object."""
 
 
-REPORTED = "what was last reported of it:"
+REPORTED_HEADING = "what was last reported of it:"
 """Heading of the latest events of a stage."""
 
 
@@ -62,12 +62,12 @@ class ReasonFinder:
     """Finds reasons for the beliefs after one step.
 
     Attributes:
-        course: Gives access to past steps.
+        timeline: Gives access to past steps.
         number: The step.
         mind: The mind after it.
     """
 
-    course: RunTimeline
+    timeline: RunTimeline
     number: int
     mind: Mind
 
@@ -75,7 +75,7 @@ class ReasonFinder:
         """The same for another step."""
         if number == self.number:
             return self
-        return ReasonFinder(self.course, number, self.course.mind_at(number))
+        return ReasonFinder(self.timeline, number, self.timeline.mind_at(number))
 
     def of(self, what: object) -> Why:
         """Explain a belief.
@@ -102,19 +102,19 @@ class ReasonFinder:
 
     def alert(self, alert_id: int) -> Why:
         """Why an alert was opened, and why it stays open; closed alerts are found, too."""
-        number, event = self._opening(alert_id)
-        then = self.after(number)
-        now = next((a for a in self.mind.alerts if a.id == alert_id), None)
+        number, event = self._opening_event(alert_id)
+        at_opening = self.after(number)
+        open_alert = next((a for a in self.mind.alerts if a.id == alert_id), None)
         text = f"alert {alert_id}, {event.data['alert_kind']}: {event.text}"
-        parts = [then._cause(str(event.data["alert_kind"]), event)]
-        if now is None:
+        parts = [at_opening._cause(str(event.data["alert_kind"]), event)]
+        if open_alert is None:
             parts.append(Why("it is closed"))
-        elif now.updated < self.mind.time:
-            parts.append(Why(f"it last held at {now.updated:.2f} s, and is not over yet"))
+        elif open_alert.updated < self.mind.time:
+            parts.append(Why(f"it last held at {open_alert.updated:.2f} s, and is not over yet"))
         return Why(text, tuple(parts), event.frame_index, event.time)
 
-    def _opening(self, alert_id: int) -> tuple[int, Event]:
-        for number, event in self.course.events(last=self.number):
+    def _opening_event(self, alert_id: int) -> tuple[int, Event]:
+        for number, event in self.timeline.events(last=self.number):
             if event.kind == "alert" and event.data.get("alert") == alert_id:
                 return number, event
         known = ", ".join(str(a.id) for a in self.mind.alerts) or "none is open now"
@@ -124,23 +124,23 @@ class ReasonFinder:
         """Why an alert condition held after this step."""
         if kind in {rule.name for rule in rule_memory(self.mind).rules}:
             return self.rule(kind, event.objects)
-        stated = tuple(Why(str(e)) for e in event.data.get("evidence", ()))
+        evidence = tuple(Why(str(e)) for e in event.data.get("evidence", ()))
         if kind == "stage_failing":
-            bad = [s.stage for t in self.mind.tasks for s in t.stages if s.evidence]
-            failing = tuple(self.stage(s) for s in bad if f"`{s}`" in event.text)
+            stages = [s.stage for t in self.mind.tasks for s in t.stages if s.evidence]
+            failing = tuple(self.stage(s) for s in stages if f"`{s}`" in event.text)
             if failing:  # these include their actors
-                return Why("because", (*stated, *failing))
+                return Why("because", (*evidence, *failing))
         if kind == BEHAVIOUR_FAILED:
-            stated += self._failed()
-        return Why("because", (*stated, *self._objects(event.objects)))
+            evidence += self._failures()
+        return Why("because", (*evidence, *self._objects(event.objects)))
 
-    def _failed(self) -> tuple[Why, ...]:
-        seen = self.course.observation_at(self.number)
-        bad = (r for r in seen.reports if r.state not in (ReportState.RAN, ReportState.RESTED))
-        return tuple(
-            Why(f"{r.behaviour} {r.state.value}: {r.error}", (), seen.frame_index, seen.time)
-            for r in bad
+    def _failures(self) -> tuple[Why, ...]:
+        observation = self.timeline.observation_at(self.number)
+        frame = observation.frame_index, observation.time
+        failed = (
+            r for r in observation.reports if r.state not in (ReportState.RAN, ReportState.RESTED)
         )
+        return tuple(Why(f"{r.behaviour} {r.state.value}: {r.error}", (), *frame) for r in failed)
 
     def rule(self, name: str, objects: tuple[int, ...]) -> Why:
         """Why a rule is true, false or unknown for some objects, with the beliefs about them.
@@ -159,13 +159,13 @@ class ReasonFinder:
             self.mind.time,
         )
 
-    def relation(self, name: str, objects: tuple[int, ...], *, deep: bool = True) -> Why:
+    def relation(self, name: str, objects: tuple[int, ...], *, with_regions: bool = True) -> Why:
         """Why a relation has its truth: its quantity, since when, and the regions of its objects.
 
         Args:
             name: The relation.
             objects: Ids.
-            deep: Whether to include the regions.
+            with_regions: Whether to include the regions.
 
         Raises:
             SettingsError: It is not evaluated.
@@ -173,43 +173,47 @@ class ReasonFinder:
         r = self.mind.relation(name, *objects)
         if r is None:
             named = f"{name}({', '.join(map(str, objects))})"
-            raise SettingsError(f"{named} is not judged", expected="a relation of objects in view")
-        who = ", ".join(short(self.mind, i) for i in objects)
+            raise SettingsError(
+                f"{named} is not evaluated", expected="a relation of objects in view"
+            )
+        names = ", ".join(short(self.mind, i) for i in objects)
         # Some false relations have no start time: their `since` is the time of the step.
-        lasting = r.since < self.mind.time
-        stands = (
-            f"has been {r.truth.value} since {r.since:.2f} s" if lasting else f"is {r.truth.value}"
+        dated = r.since < self.mind.time
+        state = (
+            f"has been {r.truth.value} since {r.since:.2f} s" if dated else f"is {r.truth.value}"
         )
-        text = f"{name}({who}) {stands}, confidence {r.confidence:.2f}"
-        parts = self._measured(r) + (self._coupled(objects) if name == "coupled" else ())
-        sights = tuple(self._sight(i) for i in objects) if deep else ()
-        return Why(text, (*parts, *sights), *self._here)
+        text = f"{name}({names}) {state}, confidence {r.confidence:.2f}"
+        parts = self._measured(r) + (self._coupling(objects) if name == "coupled" else ())
+        sightings = tuple(self._last_sighting(i) for i in objects) if with_regions else ()
+        return Why(text, (*parts, *sightings), *self._position)
 
     def _measured(self, r: Relation) -> tuple[Why, ...]:
         if r.value is None:
             return ()
-        about = "" if r.sigma is None else f" ± {r.sigma:.3g}"
-        return (Why(f"its value is {r.value:.3g}{about}"),)
+        spread = "" if r.sigma is None else f" ± {r.sigma:.3g}"
+        return (Why(f"its value is {r.value:.3g}{spread}"),)
 
-    def _coupled(self, objects: tuple[int, ...]) -> tuple[Why, ...]:
+    def _coupling(self, objects: tuple[int, ...]) -> tuple[Why, ...]:
         low, high = sorted(objects)
         pending = self.mind.recall(COUPLING).get((low, high))
         since = {
             "they last converged at": getattr(pending, "converged_at", None),
             "apart, or leaving each other, since": getattr(pending, "apart_since", None),
         }
-        dated = [Why(f"{text} {t:.2f} s") for text, t in since.items() if t is not None]
+        reasons = [Why(f"{text} {t:.2f} s") for text, t in since.items() if t is not None]
         if pending is not None:
-            dated.append(Why(f"log odds that they touch and are at rest: {pending.rest_odds:.3g}"))
+            reasons.append(
+                Why(f"log odds that they touch and are at rest: {pending.rest_odds:.3g}")
+            )
         return (
-            *dated,
+            *reasons,
             *(
-                self.relation(n, (low, high), deep=False)
-                for n in self._judged("touching", low, high)
+                self.relation(n, (low, high), with_regions=False)
+                for n in self._if_evaluated("touching", low, high)
             ),
         )
 
-    def _judged(self, name: str, *objects: int) -> tuple[str, ...]:
+    def _if_evaluated(self, name: str, *objects: int) -> tuple[str, ...]:
         return (name,) if self.mind.relation(name, *objects) is not None else ()
 
     def object(self, object_id: int) -> Why:
@@ -217,15 +221,15 @@ class ReasonFinder:
         b = self._belief(object_id)
         return Why(
             f"object {b.id} is believed to be {b.presence.value}; it is {_display_name(b)}",
-            (self._sight(object_id), self.identity(object_id)),
-            *self._here,
+            (self._last_sighting(object_id), self.identity(object_id)),
+            *self._position,
         )
 
     def identity(self, object_id: int) -> Why:
         """Explain an identity: answer, votes, and the latest matches."""
         b = self._belief(object_id)
         answer = self.mind.answers.get(object_id)
-        stated = (Why(f"the operator said that it is {answer}"),) if answer else ()
+        answered = (Why(f"the operator said that it is {answer}"),) if answer else ()
         votes = tuple(
             Why(
                 f"{c.name}: {c.votes:.2f} votes, share {c.share:.2f}, likelihood {c.confidence:.2f}"
@@ -233,29 +237,31 @@ class ReasonFinder:
             for c in b.candidates
         )
         unnamed = Why(f"none of the models: likelihood {b.unknown:.2f}")
-        looks = self._looks(b)
+        matches = self._identity_percepts(b)
         return Why(
-            f"object {b.id} is {_display_name(b)}", (*stated, *votes, unnamed, *looks), *self._here
+            f"object {b.id} is {_display_name(b)}",
+            (*answered, *votes, unnamed, *matches),
+            *self._position,
         )
 
-    def _looks(self, b: ObjectBelief) -> tuple[Why, ...]:
+    def _identity_percepts(self, b: ObjectBelief) -> tuple[Why, ...]:
         """The latest percepts about its identity."""
         number = self._step_of(b.last_seen)
-        for back in range(number, max(self.course.begin, number - LOOK_BACK), -1):
-            seen = self.course.observation_at(back)
-            found = region_percepts(seen, b.region.id, names=True)
-            named = tuple(w for w in found if w.percept and w.percept.kind != "region")
-            if named:
-                return named
-        return (Why("nothing was said of what it looks like"),)
+        for earlier in range(number, max(self.timeline.begin, number - MAX_STEPS_BACK), -1):
+            observation = self.timeline.observation_at(earlier)
+            found = region_percepts(observation, b.region.id, names=True)
+            identifying = tuple(w for w in found if w.percept and w.percept.kind != "region")
+            if identifying:
+                return identifying
+        return (Why("no recent percept is about its identity"),)
 
-    def _sight(self, object_id: int) -> Why:
+    def _last_sighting(self, object_id: int) -> Why:
         """When and as which region an object was last seen."""
         b = self._belief(object_id)
-        seen = self.course.observation_at(self._step_of(b.last_seen))
-        who = f"object {b.id}, {short(self.mind, b.id)}" if b.candidates else f"object {b.id}"
-        text = f"{who}, first seen at {b.first_seen:.2f} s, was last seen at {b.last_seen:.2f} s"
-        return Why(text, region_percepts(seen, b.region.id))
+        observation = self.timeline.observation_at(self._step_of(b.last_seen))
+        name = f"object {b.id}, {short(self.mind, b.id)}" if b.candidates else f"object {b.id}"
+        text = f"{name}, first seen at {b.first_seen:.2f} s, was last seen at {b.last_seen:.2f} s"
+        return Why(text, region_percepts(observation, b.region.id))
 
     def _objects(self, objects: tuple[int, ...]) -> tuple[Why, ...]:
         return tuple(self.object(i) for i in objects if i in self.mind.objects)
@@ -274,22 +280,22 @@ class ReasonFinder:
         raise SettingsError(f"there is no stage '{stage}'", expected=known)
 
     def _stage(self, task: TaskBelief, s: StageBelief) -> Why:
-        since = [
+        reported = [
             Why(e.text, (), e.frame_index, e.time)
-            for _, e in self.course.events(last=self.number)
+            for _, e in self.timeline.events(last=self.number)
             if e.kind.startswith("stage_") and e.data.get("stage") == s.stage
         ]
         parts = [Why(s.evidence)] if s.evidence else []
-        parts += [Why(REPORTED, tuple(since[-3:]))] if since else []
-        parts += self._asked(task) if task.current == s.stage else []
+        parts += [Why(REPORTED_HEADING, tuple(reported[-3:]))] if reported else []
+        parts += self._required_relations(task) if task.current == s.stage else []
         text = f"stage {s.stage}: {s.status.value} since {s.since:.2f} s"
         return Why(f"{text}, confidence {s.confidence:.2f}", (*parts, *self._actors(task)))
 
-    def _asked(self, task: TaskBelief) -> list[Why]:
-        found = [(e.relation, e.objects) for e in task.expected]
+    def _required_relations(self, task: TaskBelief) -> list[Why]:
+        required = [(e.relation, e.objects) for e in task.expected]
         return [
-            self.relation(n, o, deep=False)
-            for n, o in found
+            self.relation(n, o, with_regions=False)
+            for n, o in required
             if self.mind.relation(n, *o) is not None
         ]
 
@@ -329,16 +335,16 @@ class ReasonFinder:
             self.alert(a.id) for a in self.mind.alerts if a.cause.rstrip(".") == task.evidence
         )
         text = f"the verdict on {task.task} is {task.verdict.value}"
-        stated = (Why(task.evidence),) if task.evidence else ()
-        return Why(text, (*stated, *alerts, *stages), *self._here)
+        evidence = (Why(task.evidence),) if task.evidence else ()
+        return Why(text, (*evidence, *alerts, *stages), *self._position)
 
     def event(self, event: Event) -> Why:
         """Explain an event in the mind that reported it."""
         number = self._step_of(event.time)
-        then = self.after(number)
-        return Why(event.text, then._behind(event), event.frame_index, event.time)
+        at_event = self.after(number)
+        return Why(event.text, at_event._event_reasons(event), event.frame_index, event.time)
 
-    def _behind(self, event: Event) -> tuple[Why, ...]:
+    def _event_reasons(self, event: Event) -> tuple[Why, ...]:
         data: Mapping[str, Any] = event.data
         if event.kind in ("alert", "alert_closed"):
             return (self.alert(int(data["alert"])),)
@@ -352,18 +358,18 @@ class ReasonFinder:
             return (self.relation(str(data["relation"]), event.objects),)
         if event.kind in ("identified", "question", "answer"):
             return tuple(self.identity(i) for i in event.objects)
-        seen = self.course.observation_at(self.number)
-        other = (
+        observation = self.timeline.observation_at(self.number)
+        percepts = (
             ()
             if event.objects
             else tuple(
-                percept_reason(p, seen)
-                for r in seen.reports
+                percept_reason(p, observation)
+                for r in observation.reports
                 for p in r.percepts
                 if p.kind == event.kind
             )
         )
-        return (*self._objects(event.objects), *other)
+        return (*self._objects(event.objects), *percepts)
 
     def _belief(self, object_id: int) -> ObjectBelief:
         belief = self.mind.objects.get(object_id)
@@ -374,12 +380,12 @@ class ReasonFinder:
 
     def _step_of(self, time: float) -> int:
         """The step of the frame at a time, or the first known one after it."""
-        numbers = range(self.course.begin + 1, self.number + 1)
-        place = bisect_left(numbers, time, key=lambda n: self.course.observation_at(n).time)
-        return numbers[min(place, len(numbers) - 1)]
+        numbers = range(self.timeline.begin + 1, self.number + 1)
+        index = bisect_left(numbers, time, key=lambda n: self.timeline.observation_at(n).time)
+        return numbers[min(index, len(numbers) - 1)]
 
     @property
-    def _here(self) -> tuple[int, float]:
+    def _position(self) -> tuple[int, float]:
         return self.mind.frame_index, self.mind.time
 
 

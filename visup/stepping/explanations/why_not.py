@@ -30,11 +30,11 @@ from visup.rules.wording.conditions import Condition, DecisionLog
 from visup.rules.wording.sentences import short
 from visup.stepping.explanations.evidence import Why, explanation_tree
 
-STANDS = {
-    Status.ACTIVE: "no part of it was seen yet",
+STATUS_CLAUSES = {
+    Status.ACTIVE: "no part of it has been seen yet",
     Status.DONE: "is complete",
     Status.FAILED: "has failed",
-    Status.UNKNOWN: "cannot be judged",
+    Status.UNKNOWN: "cannot be evaluated",
 }
 """Clauses for statuses of stages."""
 
@@ -53,7 +53,7 @@ def rule_unmet(mind: Mind, name: str, ids: tuple[int, ...] = ()) -> Why:
     Raises:
         RuleError: There is no such rule, or it is not evaluated for these objects.
     """
-    found = [explain(mind, name, *ids)] if ids else _each(mind, name)
+    found = [explain(mind, name, *ids)] if ids else _all_explanations(mind, name)
     if not found:
         count = len(rule_named(evaluation_of(mind), name).variables)
         return Why(f"{name} is about {count} object(s), and that many are not in view")
@@ -71,7 +71,7 @@ def rule_unmet(mind: Mind, name: str, ids: tuple[int, ...] = ()) -> Why:
     return Why(nearest.line(), tuple(parts), mind.frame_index, mind.time)
 
 
-def _each(mind: Mind, name: str) -> list[RuleExplanation]:
+def _all_explanations(mind: Mind, name: str) -> list[RuleExplanation]:
     values = evaluation_of(mind)
     return [explain(mind, name, *ids) for ids in object_choices(values, rule_named(values, name))]
 
@@ -96,15 +96,17 @@ def stage_unmet(mind: Mind, stage: str) -> Why:
             if s.stage != stage:
                 continue
             if s.status is not Status.PENDING:
-                stands = STANDS.get(s.status, f"is {s.status.value}")
+                status = STATUS_CLAUSES.get(s.status, f"is {s.status.value}")
                 why = f": {s.evidence}" if s.evidence else ""
-                return Why(f"stage {stage} has begun, and {stands}{why}")
-            return Why(f"stage {stage} is pending", tuple(_before_stage(mind, task, number)))
+                return Why(f"stage {stage} has begun, and {status}{why}")
+            return Why(
+                f"stage {stage} is pending", tuple(_missing_before_stage(mind, task, number))
+            )
     known = ", ".join(s.stage for t in mind.tasks for s in t.stages) or "no task was given"
     raise SettingsError(f"there is no stage '{stage}'", expected=known)
 
 
-def _before_stage(mind: Mind, task: TaskBelief, number: int) -> Iterator[Why]:
+def _missing_before_stage(mind: Mind, task: TaskBelief, number: int) -> Iterator[Why]:
     for b in task.bindings:
         if b.object_id is None:
             yield Why(f"{b.actor} ({' or '.join(b.models)}) is not bound to any object")
@@ -113,13 +115,13 @@ def _before_stage(mind: Mind, task: TaskBelief, number: int) -> Iterator[Why]:
             yield Why(f"before it, {s.stage} is {s.status.value}: {s.evidence or 'not begun'}")
     if task.verdict.value in ("interrupted", "failed", "succeeded"):
         yield Why(f"the task is {task.verdict.value}: {task.evidence}")
-    for wanted in task.expected:
-        r = mind.relation(wanted.relation, *wanted.objects)
-        who = ", ".join(short(mind, i) for i in wanted.objects)
+    for required in task.expected:
+        r = mind.relation(required.relation, *required.objects)
+        names = ", ".join(short(mind, i) for i in required.objects)
         if r is None or r.truth is not Truth.TRUE:
-            stands = "not judged" if r is None else r.truth.value
-            amount = "" if r is None or r.value is None else f"; its value is {r.value:.3g}"
-            yield Why(f"awaited: {wanted.relation}({who}) is {stands}{amount}")
+            truth = "not evaluated" if r is None else r.truth.value
+            value = "" if r is None or r.value is None else f"; its value is {r.value:.3g}"
+            yield Why(f"awaited: {required.relation}({names}) is {truth}{value}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,19 +146,19 @@ class LastStep:
         """The conditions of a reasoner's decision in this step."""
         if self.before is None or self.observation is None:
             return (Condition("a step has been taken", False),)
-        seen = self.observation
+        observation = self.observation
         mind = replace(
             self.before,
-            time=seen.time,
-            frame_index=seen.frame_index,
-            frame_size=seen.frame_size,
+            time=observation.time,
+            frame_index=observation.frame_index,
+            frame_size=observation.frame_size,
             answers=MappingProxyType({**self.before.answers, **self.mind.answers}),
         )
         for reasoner in self.reasoners:
-            bare = getattr(reasoner, "reasoner", reasoner)  # unwrap `AssumingReasoner`
-            if isinstance(bare, kind):
-                return bare.explain(mind, seen).get((decision, objects), ())
-            mind = reasoner(mind, seen).mind
+            unwrapped = getattr(reasoner, "reasoner", reasoner)  # unwrap `AssumingReasoner`
+            if isinstance(unwrapped, kind):
+                return unwrapped.explain(mind, observation).get((decision, objects), ())
+            mind = reasoner(mind, observation).mind
         return (Condition("there is a reasoner that decides it", False),)
 
 
@@ -185,14 +187,16 @@ _CHANGES = {
 """Presence -> the decision that leads to it."""
 
 
-def presence_unmet(step: LastStep, object_id: int, wanted: Presence) -> Why:
+def presence_unmet(step: LastStep, object_id: int, presence: Presence) -> Why:
     """Why an object is not believed to be hidden, gone or seen."""
     belief = _belief(step.mind, object_id)
-    if belief.presence is wanted:
-        return Why(f"object {object_id} is {wanted.value}")
-    is_now = Why(f"it is {belief.presence.value}, last seen at {belief.last_seen:.2f} s")
-    unmet = _conditions(step, PresenceReasoner, _CHANGES[wanted], (object_id,))
-    return Why(f"object {object_id} is not believed to be {wanted.value}", (is_now, *unmet))
+    if belief.presence is presence:
+        return Why(f"object {object_id} is {presence.value}")
+    present_state = Why(f"it is {belief.presence.value}, last seen at {belief.last_seen:.2f} s")
+    unmet = _conditions(step, PresenceReasoner, _CHANGES[presence], (object_id,))
+    return Why(
+        f"object {object_id} is not believed to be {presence.value}", (present_state, *unmet)
+    )
 
 
 def identity_unmet(step: LastStep, object_id: int) -> Why:
@@ -202,8 +206,8 @@ def identity_unmet(step: LastStep, object_id: int) -> Why:
     if votes.reported is not None and votes.reported == belief.name:
         return Why(f"object {object_id} was identified as {votes.reported}")
     parts = [*_conditions(step, IdentityReasoner, "identified", (object_id,))]
-    heard = "never" if votes.last_matched is None else f"at {votes.last_matched:.2f} s"
-    parts.append(Why(f"what it looks like was last said {heard}"))
+    last_match = "never" if votes.last_matched is None else f"at {votes.last_matched:.2f} s"
+    parts.append(Why(f"last matched against the models: {last_match}"))
     if not belief.confirmed:
         parts.append(entry_unmet(step, object_id))
     return Why(f"object {object_id} is not identified", tuple(parts))
@@ -217,9 +221,9 @@ def coupling_unmet(step: LastStep, a: int, b: int) -> Why:
     if step.mind.coupled(low, high):
         return Why(f"objects {low} and {high} are coupled")
     touching = step.mind.relation("touching", low, high)
-    stands = Why(f"touching is {touching.truth.value if touching else 'not judged'}")
+    touching_state = Why(f"touching is {touching.truth.value if touching else 'not evaluated'}")
     unmet = _conditions(step, CouplingReasoner, "coupled", (low, high))
-    return Why(f"objects {low} and {high} are not believed to be coupled", (stands, *unmet))
+    return Why(f"objects {low} and {high} are not believed to be coupled", (touching_state, *unmet))
 
 
 def _conditions(
@@ -231,20 +235,20 @@ def _conditions(
 def relation_unmet(mind: Mind, name: str, objects: tuple[int, ...]) -> Why:
     """Why a relation is not true."""
     r = mind.relation(name, *objects)
-    called = f"{name}({', '.join(map(str, objects))})"
+    call = f"{name}({', '.join(map(str, objects))})"
     if r is None:
-        away = [i for i in objects if i not in {b.id for b in mind.present()}]
-        parts = tuple(Why(f"object {i} is not believed to be there") for i in away)
-        return Why(f"{called} is not judged", parts)
-    found = []
+        absent = [i for i in objects if i not in {b.id for b in mind.present()}]
+        parts = tuple(Why(f"object {i} is not believed to be there") for i in absent)
+        return Why(f"{call} is not evaluated", parts)
+    reasons = []
     if r.value is not None:
-        about = "" if r.sigma is None else f" ± {r.sigma:.3g}"
-        found.append(Why(f"its value is {r.value:.3g}{about}"))
+        spread = "" if r.sigma is None else f" ± {r.sigma:.3g}"
+        reasons.append(Why(f"its value is {r.value:.3g}{spread}"))
     for i in objects:
         belief = mind.objects[i]
         if belief.last_seen < mind.time:
-            found.append(Why(f"object {i} was last seen at {belief.last_seen:.2f} s"))
-    return Why(f"{called} has been {r.truth.value} since {r.since:.2f} s", tuple(found))
+            reasons.append(Why(f"object {i} was last seen at {belief.last_seen:.2f} s"))
+    return Why(f"{call} has been {r.truth.value} since {r.since:.2f} s", tuple(reasons))
 
 
 def alert_unmet(mind: Mind, kind: str, objects: tuple[int, ...]) -> Why:
@@ -253,13 +257,13 @@ def alert_unmet(mind: Mind, kind: str, objects: tuple[int, ...]) -> Why:
         if alert.kind == kind and (not objects or set(alert.objects) == set(objects)):
             return Why(f"alert {alert.id} is open since {alert.opened:.2f} s: {alert.cause}")
     why = rule_unmet(mind, kind, objects)
-    cooling = rule_memory(mind).cooling.items()
-    resting = [
+    cooldowns = rule_memory(mind).cooling.items()
+    cooling_down = [
         Why(f"it rests for objects {sorted(who)} until {until:.2f} s")
-        for (rule, who), until in cooling
+        for (rule, who), until in cooldowns
         if rule == kind
     ]
-    return Why(why.text, (*why.parts, *resting), why.frame_index, why.time)
+    return Why(why.text, (*why.parts, *cooling_down), why.frame_index, why.time)
 
 
 def _belief(mind: Mind, object_id: int) -> ObjectBelief:

@@ -163,12 +163,12 @@ def _phase(record: PhaseRecord, *, last: bool) -> None:
         ui.label(PHASES[record.phase]).classes("dim")
     for kind, count in sorted(record.percepts.items()):
         ui.label(shown_text(f"{count} × {kind.replace('_', ' ')}")).classes("why under-phase")
-    for text in record.told:
+    for text in record.events:
         ui.label(shown_text(prose(text))).classes("why under-phase told")
     for change in record.changes[:MOST_CHANGES]:
         ui.label(shown_text(str(change))).classes("why under-phase")
     if len(record.changes) > MOST_CHANGES:
         more = len(record.changes) - MOST_CHANGES
         ui.label(f"and {more} more").classes("dim under-phase")
-    if not (record.percepts or record.told or record.changes):
+    if not (record.percepts or record.events or record.changes):
         ui.label("changes nothing").classes("dim under-phase")

@@ -1,4 +1,4 @@
-"""What is told of clips: missions and worlds on percepts from their truth, machines as they are taught."""
+"""Narratives of missions, rendered worlds, taught clips and recorded runs."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import tempfile
 from dataclasses import replace
 from pathlib import Path
 
-from tests.story.voice import Told, told_of
+from tests.narrative.consistency import NarratedRun, narrated
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.step import Step
 from visup.agent.storage.journal_reader import Recording
@@ -23,8 +23,8 @@ from visup.tasks.supervision.supervise import task_reasoner
 from visup.teaching.lesson import store, views_of
 
 
-def told_of_mission(folder: Path, noise: PerceptNoise, every: int) -> Told:
-    """What is told of a mission on percepts made from its truth, of every so many frames."""
+def narrate_mission(folder: Path, noise: PerceptNoise, every: int) -> NarratedRun:
+    """The narrative of a mission on percepts simulated from its truth, of every n-th frame."""
     mission = load_mission(folder, every=every)
     behaviours, _ = behaviours_of(mission, noise)
     rules = default_reasoners()
@@ -34,19 +34,19 @@ def told_of_mission(folder: Path, noise: PerceptNoise, every: int) -> Told:
         reasoners=Reasoners(rules.update, rules.cogitate, (task,)),
         actors={a: (m,) for a, m in mission.description["actors"].items()},
     )
-    return told_of(agent.steps(frames_of(mission, every=every)))
+    return narrated(agent.steps(frames_of(mission, every=every)))
 
 
-def told_of_world(folder: Path, every: int = 1) -> Told:
-    """What is told of a rendered world, whose masks are its percepts."""
+def narrate_world(folder: Path, every: int = 1) -> NarratedRun:
+    """The narrative of a rendered world, whose masks are its percepts."""
     settings = replace(clip_settings(read_brief(folder)), every=every)
     agent = reasoning_agent(settings, (), mask_behaviours(folder))
     with open_video(settings) as video:
-        return told_of(agent.steps(video))
+        return narrated(agent.steps(video))
 
 
-def told_of_clip(folder: Path) -> Told:
-    """What is told of a clip whose things are taught from its brief: minutes for each."""
+def narrate_clip(folder: Path) -> NarratedRun:
+    """The narrative of a clip whose objects are taught from its brief; takes minutes."""
     brief = read_brief(folder)
     with tempfile.TemporaryDirectory() as scratch:
         models = Path(scratch) / "taught.models"
@@ -55,13 +55,13 @@ def told_of_clip(folder: Path) -> Told:
         agent = build_agent(settings)
         try:
             with open_video(settings) as video:
-                return told_of(agent.steps(video))
+                return narrated(agent.steps(video))
         finally:
             agent.close()
 
 
-def told_of_run(run: Path) -> Told:
-    """What is told of a recorded run when it is reasoned about again."""
+def narrate_run(run: Path) -> NarratedRun:
+    """The narrative of a recorded run, replayed."""
     recording, steps = Recording.open(run), list[Step]()
     replay(recording, settings_for(recording), on_step=steps.append)
-    return told_of(steps)
+    return narrated(steps)

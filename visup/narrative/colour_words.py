@@ -5,10 +5,21 @@ from __future__ import annotations
 from visup.percepts.colour import Palette
 from visup.rules.traits.colours import colour_share
 
-PLAIN = ("red", "orange", "yellow", "green", "blue", "purple", "pink", "brown", "white", "black")
+COLOUR_WORDS = (
+    "red",
+    "orange",
+    "yellow",
+    "green",
+    "blue",
+    "purple",
+    "pink",
+    "brown",
+    "white",
+    "black",
+)
 GREY = "grey"
 
-LEAST_SHARE = 0.35
+MIN_SHARE = 0.35
 """Least share of an object's pixels for it to be called by a colour."""
 
 
@@ -21,8 +32,8 @@ def colour_word(palette: Palette) -> str | None:
     >>> colour_word(((52.0, 80.0, 70.0, 0.7), (50.0, 0.0, 0.0, 0.3)))
     'red'
     """
-    shares = {word: colour_share(word, palette) for word in PLAIN}
+    shares = {word: colour_share(word, palette) for word in COLOUR_WORDS}
     best = max(shares, key=lambda word: shares[word])
-    if shares[best] >= LEAST_SHARE:
+    if shares[best] >= MIN_SHARE:
         return best
-    return GREY if colour_share(GREY, palette) >= LEAST_SHARE else None
+    return GREY if colour_share(GREY, palette) >= MIN_SHARE else None

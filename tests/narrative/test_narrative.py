@@ -1,4 +1,4 @@
-"""What is told of a run: a line a life, few a minute, nothing grave withheld."""
+"""The narrative of a run: one line per visit, few per minute, no warning withheld."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 from visup.agent import Event, Frame, Mind, ObjectBelief, Observation, Presence, Severity
 from visup.agent.model.object_beliefs import Candidate
 from visup.agent.model.step import Step
-from visup.story import Detail, Narrative, summary_lines
-from visup.story.life_sentences import course, lives_sentence
-from visup.story.line_budget import LineBudget
-from visup.story.lives import LifeLog, ObjectLife
-from visup.story.places import Box
+from visup.narrative import Detail, Narrative, summary_lines
+from visup.narrative.places import Box
+from visup.narrative.rate_limit import LineRateLimit
+from visup.narrative.visit_sentences import path_clause, visits_sentence
+from visup.narrative.visits import ObjectVisit, VisitLog
 from visup.testing import region_of
 from visup.wording import worded_once
 
@@ -65,7 +65,7 @@ def times(seconds: float) -> list[float]:
     return [n / FPS for n in range(round(seconds * FPS) + 1)]
 
 
-def told(steps: Sequence[Step], detail: Detail = Detail.USUAL) -> list[Event]:
+def narrated(steps: Sequence[Step], detail: Detail = Detail.USUAL) -> list[Event]:
     narrative = Narrative(detail)
     lines = [e for s in steps for e in narrative.lines(s, None)]
     return [*lines, *narrative.rest(steps[-1].time, 0)]
@@ -75,33 +75,33 @@ def event(kind: str, now: float, *ids: int, severity: Severity = Severity.INFO) 
     return Event(kind, now, round(now * FPS), f"{kind} {ids} {now}.", ids, severity=severity)
 
 
-def test_a_life_is_one_line_with_who_where_how_long_and_whom_it_came_near() -> None:
+def test_a_visit_is_one_line_with_object_path_duration_and_closest_object() -> None:
     stays = [belief(1, 230.0, 130.0, t, first_seen=0.0) for t in times(12)]
     steps = [
         step(t, stay, *([crossing(4, 3.0, 6.0, t)] if t >= 3 else []))
         for t, stay in zip(times(12), stays, strict=True)
     ]
-    lines = [e.text for e in told(steps)]
+    lines = [e.text for e in narrated(steps)]
     assert lines[0] == "Object 4 crossed from left to right, 3.0 s, closest to object 1 at 10 px."
     assert lines[1].startswith("Object 1 has been in view since 0.0 s, now on the right")
-    assert len(lines) == 2  # that it is still there is not told twice
+    assert len(lines) == 2  # that it is still in view is not reported twice
 
 
-def test_who_is_sure_to_be_an_object_late_is_told_from_where_it_was_first_seen() -> None:
-    """It counts as an object only near the other side, where it would be said to come in."""
+def test_the_visit_of_an_object_confirmed_late_begins_where_it_was_first_seen() -> None:
+    """It is confirmed only near the right side, which would otherwise count as its entry."""
     steps = [
         step(t, *([replace(crossing(13, 1.0, 4.0, t), confirmed=t > 3.7)] if t >= 1 else []))
         for t in times(9)
     ]
-    assert [e.text for e in told(steps)] == ["Object 13 crossed from left to right, 3.0 s."]
+    assert [e.text for e in narrated(steps)] == ["Object 13 crossed from left to right, 3.0 s."]
 
 
-def test_who_never_becomes_an_object_is_not_told_of() -> None:
+def test_an_object_that_is_never_confirmed_is_not_reported() -> None:
     steps = [
         step(t, *([replace(crossing(3, 1.0, 4.0, t), confirmed=False)] if t >= 1 else []))
         for t in times(9)
     ]
-    assert told(steps) == []
+    assert narrated(steps) == []
 
 
 @pytest.mark.parametrize(
@@ -124,20 +124,20 @@ def test_who_never_becomes_an_object_is_not_told_of() -> None:
         ),
     ],
 )
-def test_a_course_is_told_by_its_sides(first: Box, last: Box, left: bool, words: str) -> None:
-    assert course(ObjectLife(1, SIZE, 1.0, 4.0, first, last, left=left)) == words
+def test_a_path_is_described_by_its_sides(first: Box, last: Box, left: bool, words: str) -> None:
+    assert path_clause(ObjectVisit(1, SIZE, 1.0, 4.0, first, last, left=left)) == words
 
 
-def test_who_is_there_to_the_end_is_told_to_be() -> None:
+def test_a_visit_until_the_end_of_the_run_is_reported_as_such() -> None:
     steps = [step(t, *([crossing(2, 2.0, 15.0, t)] if t >= 2 else [])) for t in times(8)]
-    assert [e.text for e in told(steps)] == [
+    assert [e.text for e in narrated(steps)] == [
         "Object 2 came in from the left and was still in view in the middle at the end, 6.0 s."
     ]
 
 
 @pytest.mark.parametrize(("seconds", "most"), [(2.0, 1), (12.4, 2), (28.4, 4), (60.0, 9)])
 def test_a_short_clip_has_no_more_lines_a_minute_than_a_long_one(seconds: float, most: int) -> None:
-    """Someone crosses every second, each another way: some lines, at most ten for each minute."""
+    """Every second an object crosses, in turns on two lanes: some lines, at most ten for each minute."""
     steps = []
     for t in times(seconds):
         alive = [
@@ -146,39 +146,39 @@ def test_a_short_clip_has_no_more_lines_a_minute_than_a_long_one(seconds: float,
             if n <= t
         ]
         steps.append(step(t, *alive))
-    assert 1 <= len(told(steps)) <= most
+    assert 1 <= len(narrated(steps)) <= most
 
 
-def test_the_summary_counts_those_too_of_whom_nothing_was_told() -> None:
+def test_the_summary_also_counts_visits_without_a_line() -> None:
     steps = [
         step(t, *(crossing(n, n, n + 1.0, t) for n in range(1, 6) if n <= t)) for t in times(8)
     ]
     narrative = Narrative()
     lines = [e.text for s in steps for e in narrative.lines(s, None)]
     assert not any("5" in text for text in lines)
-    assert next(iter(summary_lines(narrative.log, narrative.courses))) == (
+    assert next(iter(summary_lines(narrative.log, narrative.paths))) == (
         "Seen: 5 objects, at most 2 at a time; 5 crossed from left to right."
     )
 
 
-def test_lives_of_one_course_share_a_line() -> None:
+def test_visits_along_the_same_path_share_a_line() -> None:
     lanes = {4: 0.0, 5: 60.0, 6: 120.0, 7: 180.0, 8: 210.0, 9: 30.0}
     steps = [
         step(t, *(crossing(i, 3.0, 6.0, t, y) for i, y in lanes.items() if t >= 3.0))
         for t in times(9)
     ]
-    assert [e.text for e in told(steps)] == [
+    assert [e.text for e in narrated(steps)] == [
         "Objects 4, 5, 6, 7 and 2 more crossed from left to right, 3.0 s."
     ]
 
 
-def test_who_comes_twice_is_named_once() -> None:
-    one = ObjectLife(17, SIZE, 1.0, 2.0, (0, 0, 9, 9), (50, 0, 9, 9))
+def test_an_object_with_two_visits_is_named_once() -> None:
+    one = ObjectVisit(17, SIZE, 1.0, 2.0, (0, 0, 9, 9), (50, 0, 9, 9))
     lives = [one, replace(one, since=4.0, until=7.0), replace(one, id=18)]
-    assert lives_sentence(lives) == (
+    assert visits_sentence(lives) == (
         "Objects 17 and 18 came in from the left and were last seen there, 1.0 to 3.0 s each."
     )
-    assert lives_sentence(lives[:2]) == (
+    assert visits_sentence(lives[:2]) == (
         "Object 17 came in from the left and was last seen there, 3.0 s."
     )
 
@@ -187,11 +187,11 @@ def test_who_comes_twice_is_named_once() -> None:
     ("later", "colours"),
     [(BLUE, ["blue", "blue"]), (RED, ["blue", None]), (None, ["blue", "blue"])],
 )
-def test_who_comes_back_is_not_told_of_with_another_colour(
+def test_an_object_that_returns_is_not_reported_with_another_colour(
     later: tuple[int, int, int] | None, colours: list[str | None]
 ) -> None:
-    """An id may pass from one thing to another; nobody is blue in one line and red in the next."""
-    log, lives = LifeLog(), list[ObjectLife]()
+    """An id may pass from one thing to another; no object is blue in one line and red in the next."""
+    log, lives = VisitLog(), list[ObjectVisit]()
     for t in times(14):
         side, colour = (20, BLUE) if t < 7 else (60, later)
         where = belief(3, 30, 30, t) if side == 20 else grown(belief(3, 30, 30, t), side)
@@ -200,30 +200,30 @@ def test_who_comes_back_is_not_told_of_with_another_colour(
         log_frame = None if colour is None else painted(t, colour)
         lives += log.add(step(t, seen), log_frame)
     lives += log.finish()
-    assert [life.colour for life in lives] == colours
+    assert [visit.colour for visit in lives] == colours
 
 
-def test_specks_and_glimpses_are_only_counted() -> None:
+def test_tiny_objects_and_short_visits_are_only_counted() -> None:
     steps = [step(t, *([crossing(2, 1.0, 1.4, t)] if t >= 1.0 else [])) for t in times(5)]
     narrative = Narrative()
     assert [e for s in steps for e in narrative.lines(s, None)] + narrative.rest(
         steps[-1].time, 0
     ) == []
-    assert next(iter(summary_lines(narrative.log, narrative.courses))) == "Seen: 1 object."
+    assert next(iter(summary_lines(narrative.log, narrative.paths))) == "Seen: 1 object."
 
 
-def test_relations_of_objects_that_nobody_knows_are_told_on_request_alone() -> None:
+def test_relations_of_unknown_objects_are_reported_only_on_request() -> None:
     met = event("relation", 1.0, 1, 2)
     steps = [step(1.0, belief(1, 50, 50, 1.0), belief(2, 90, 50, 1.0), events=[met])]
-    assert told(steps) == []
-    assert told(steps, Detail.ALL) == [met]
+    assert narrated(steps) == []
+    assert narrated(steps, Detail.ALL) == [met]
 
 
-def test_of_named_objects_the_same_is_not_told_again_and_again() -> None:
+def test_events_of_named_objects_are_not_repeated_at_once() -> None:
     known = (Candidate("arm", 1.0, 1.0, 0.99),)
     both = [belief(i, 60.0 * i, 50, 1.0, candidates=known, unknown=0.0) for i in (1, 2)]
     steps = [step(t, *both, events=[event("relation", t, 1, 2)]) for t in times(30)]
-    assert [e.time for e in told(steps)] == pytest.approx([0.0, 10.0, 20.0, 30.0])
+    assert [e.time for e in narrated(steps)] == pytest.approx([0.0, 10.0, 20.0, 30.0])
 
 
 KINDS = ("relation", "entry", "alert", "stage_failing", "coupled", "of_a_plugin")
@@ -234,7 +234,7 @@ KINDS = ("relation", "entry", "alert", "stage_failing", "coupled", "of_a_plugin"
     st.lists(st.integers(1, 40), min_size=1, max_size=40),
     st.lists(st.tuples(st.sampled_from(KINDS), st.booleans()), min_size=1, max_size=6),
 )
-def test_however_much_happens_lines_are_few_and_nothing_grave_is_withheld(
+def test_lines_are_few_and_no_warning_is_withheld_however_much_happens(
     begins: list[int], kinds: list[tuple[str, bool]]
 ) -> None:
     known = (Candidate("arm", 1.0, 1.0, 0.99),)
@@ -251,22 +251,24 @@ def test_however_much_happens_lines_are_few_and_nothing_grave_is_withheld(
             for n, (k, grave) in enumerate(kinds)
         ]
         steps.append(step(t, *alive, *both, events=happen))
-    lines = told(steps)
+    lines = narrated(steps)
     grave = [e for s in steps for e in worded_once(s.events) if e.severity > Severity.INFO]
     assert [e for e in lines if e.severity > Severity.INFO] == grave
-    about = [e for e in lines if e.kind in ("life", "relation", "entry", "alert", "coupled")]
-    light = [e for e in about if e.severity is Severity.INFO]
-    assert len(light) <= 10
-    assert all(e.objects for e in light)
+    object_events = [
+        e for e in lines if e.kind in ("life", "relation", "entry", "alert", "coupled")
+    ]
+    unalarming = [e for e in object_events if e.severity is Severity.INFO]
+    assert len(unalarming) <= 10
+    assert all(e.objects for e in unalarming)
 
 
 @given(st.lists(st.floats(0.0, 3.0), min_size=1, max_size=200))
 def test_no_minute_has_more_than_ten_lines(pauses: list[float]) -> None:
-    budget, now, taken = LineBudget(), 0.0, []
+    limiter, now, allowed = LineRateLimit(), 0.0, []
     for pause in pauses:
         now += pause
-        taken += [now] if budget.take(now) else []
-    assert all(sum(t <= x < t + 60.0 for x in taken) <= 10 for t in taken)
+        allowed += [now] if limiter.allow(now) else []
+    assert all(sum(t <= x < t + 60.0 for x in allowed) <= 10 for t in allowed)
 
 
 def test_a_summary_names_the_busiest_pair_and_the_longest_stay() -> None:
@@ -281,7 +283,7 @@ def test_a_summary_names_the_busiest_pair_and_the_longest_stay() -> None:
         narrative.lines(last, None)
     assert last is not None
     narrative.rest(last.time, last.frame_index)
-    assert list(summary_lines(narrative.log, narrative.courses)) == [
+    assert list(summary_lines(narrative.log, narrative.paths)) == [
         "Seen: 3 objects, at most 3 at a time.",
         "Longest in view: object 1, 8.0 s, last in the middle.",
         "Busiest pair: objects 1 and 2, near each other for 4.9 s, at the closest 5 px apart.",

@@ -5,7 +5,7 @@ from __future__ import annotations
 Box = tuple[int, int, int, int]
 """(x, y, width, height), pixels, y down."""
 
-AT_BORDER = 0.015
+MAX_BORDER_GAP = 0.015
 """A box that comes so near to the border, in picture sides, is cut by it or about to be."""
 
 SIDES = ("left", "right", "top", "bottom")
@@ -47,5 +47,5 @@ def sides_of(box: Box, size: tuple[int, int]) -> tuple[str, ...]:
     """
     x, y, w, h = box
     gaps = (x / size[0], 1 - (x + w) / size[0], y / size[1], 1 - (y + h) / size[1])
-    near = [(gap, side) for gap, side in zip(gaps, SIDES, strict=True) if gap <= AT_BORDER]
+    near = [(gap, side) for gap, side in zip(gaps, SIDES, strict=True) if gap <= MAX_BORDER_GAP]
     return tuple(side for _, side in sorted(near, key=lambda g: g[0]))
