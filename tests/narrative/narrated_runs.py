@@ -20,7 +20,7 @@ from visup.runs.replay import replay, settings_for
 from visup.runs.wiring import build_agent, open_video, reasoning_agent
 from visup.tasks import load_task
 from visup.tasks.supervision.supervise import task_reasoner
-from visup.teaching.lesson import store, views_of
+from visup.teaching.outline_teaching import store, views_of
 
 
 def narrate_mission(folder: Path, noise: PerceptNoise, every: int) -> NarratedRun:

@@ -23,7 +23,7 @@ from visup.runs.resume import interrupted_run
 from visup.runs.runner import fresh_folder, supervised
 from visup.runs.settings import RunOptions, WatchSettings
 from visup.runs.unattended.next_run import RETRY_S, RollOver
-from visup.serving.run_store import RunStore, begin_run, run_under_way
+from visup.serving.run_store import RunStore, begin_run, resumable_run
 
 RULE = 'rule seen(a): warning\n    when in_view(a) > 0.1 s\n    say "{a} {is} seen."\n'
 
@@ -65,14 +65,14 @@ class Camera:
 
     def watch(self, steps: int) -> None:
         """As a process that is killed after so many steps."""
-        folder = run_under_way(self.store.folder, "a")
+        folder = resumable_run(self.store.folder, "a")
         past = interrupted_run(folder) if folder else None
         place = folder or fresh_folder(begin_run(self.store.folder, "a"), "")
         options = replace(self.options, run_s=self.options.run_s)
         run = supervised(
             past.settings if past else self.settings,
             place,
-            Audience(places=self.store),
+            Audience(run_folders=self.store),
             options,
             past,
         )
@@ -146,7 +146,7 @@ def test_a_run_that_goes_on_elsewhere_is_not_taken_up(camera: Camera) -> None:
     first = next(camera.runs()).path.parent
     with pytest.raises(OutputError, match="continues in another"):
         interrupted_run(first)
-    assert run_under_way(camera.store.folder, "a") != first
+    assert resumable_run(camera.store.folder, "a") != first
 
 
 def test_one_without_a_step_or_a_state_is_told_apart(tmp_path: Path) -> None:

@@ -77,7 +77,7 @@ def test_a_run_keeps_the_password_to_itself(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("visup.sinks.webhook.FIRST_WAIT_S", 0.05)
+    monkeypatch.setattr("visup.sinks.webhook.INITIAL_WAIT_S", 0.05)
     hook = f"webhook:http://guard:{WORDS[0]}@127.0.0.1:{server.server_port}/{WORDS[1]}"
     lost = f"webhook:http://127.0.0.1:1/services/{WORDS[1]}"
     sinks = ["--sink", hook, "--sink", lost, "--sink", "file:alerts.jsonl"]

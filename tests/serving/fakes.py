@@ -48,7 +48,7 @@ class FakeChild:
     def cpu_s(self) -> float | None:
         return None
 
-    def ask_to_end(self) -> None:
+    def terminate(self) -> None:
         self.asked += 1
         if not self.stubborn and self.code is None:
             self.code = 130

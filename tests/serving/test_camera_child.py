@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from visup.runs.settings import RunOptions, WatchSettings
 from visup.serving.camera_child import CameraChild
 from visup.serving.reports import (
-    LONGEST_LINE,
+    MAX_LINE_BYTES,
     CameraJob,
     CameraReport,
     ReportKind,
@@ -61,7 +61,7 @@ def test_a_job_is_read_as_it_was_written() -> None:
     assert parse_job(job_line(JOB)) == JOB
 
 
-TEXTS = st.text(max_size=3 * LONGEST_LINE)
+TEXTS = st.text(max_size=3 * MAX_LINE_BYTES)
 
 
 @given(st.sampled_from(ReportKind), st.dictionaries(st.text(max_size=5), TEXTS, max_size=3))
@@ -70,7 +70,7 @@ def test_a_report_is_one_short_line(kind: ReportKind, data: dict[str, str]) -> N
     line = report_line(CameraReport(kind, data))
     assert line.count(b"\n") == 1
     assert line.endswith(b"\n")
-    assert len(line) <= LONGEST_LINE + 1
+    assert len(line) <= MAX_LINE_BYTES + 1
     read = parse_report(line)
     assert read is not None
     assert read.kind is kind
@@ -141,7 +141,7 @@ def test_it_can_be_asked_and_with_it_goes_what_it_began() -> None:
         return bool(heard)
 
     wait_for(told)
-    one.ask_to_end()
+    one.terminate()
     wait_for(lambda: one.exit_code() is not None)
     one.close()
     assert one.exit_code() == 130

@@ -98,7 +98,7 @@ def test_it_ends_without_its_supervisor_and_the_next_goes_on(tmp_path: Path) -> 
     told: list[CameraReport] = []
     child = CameraChild(CameraJob(settings, OPTIONS, tmp_path / "run", resume=False))
     wait_for(lambda: (tmp_path / "run" / "state.bin").is_file())
-    child.let_go()
+    child.close_stdin()
     wait_for(lambda: child.exit_code() is not None)
     told += child.reports()
     child.close()

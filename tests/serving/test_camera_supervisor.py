@@ -10,20 +10,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.serving.fakes import Bench, begun_journal, site_camera
-from visup.serving.backoff import CALM_S, LONGEST_WAIT_S, Backoff
-from visup.serving.camera_supervisor import CLOSE_S, CameraState, CameraSupervisor
+from visup.serving.backoff import HEALTHY_S, MAX_WAIT_S, Backoff
+from visup.serving.camera_supervisor import KILL_AFTER_S, CameraState, CameraSupervisor
 from visup.serving.reports import ReportKind
 
 STEP, NOTICE = ReportKind.STEP, ReportKind.NOTICE
 ENDED, REFUSED = ReportKind.ENDED, ReportKind.REFUSED
 
 
-@given(st.lists(st.floats(0.0, 2 * CALM_S), min_size=1, max_size=60))
+@given(st.lists(st.floats(0.0, 2 * HEALTHY_S), min_size=1, max_size=60))
 def test_waits_grow_up_to_a_bound_and_are_short_again_after_calm(ran: list[float]) -> None:
     backoff, last = Backoff(), 0.0
     for ran_s in ran:
         backoff = backoff.after(ran_s)
-        expected = 1.0 if ran_s >= CALM_S or not last else min(LONGEST_WAIT_S, 2 * last)
+        expected = 1.0 if ran_s >= HEALTHY_S or not last else min(MAX_WAIT_S, 2 * last)
         assert backoff.wait_s == expected
         last = backoff.wait_s
 
@@ -37,14 +37,14 @@ class Cell:
         self.store = store
         self.supervisor = CameraSupervisor(site_camera(), store, self.bench.tell, self.bench.start)
 
-    def turn(self, later_s: float = 0.0) -> None:
+    def tick(self, later_s: float = 0.0) -> None:
         self.now += later_s
-        self.supervisor.turn(self.now)
+        self.supervisor.tick(self.now)
 
     def step(self) -> None:
         begun_journal(self.bench.last.job.folder)
         self.bench.last.tell(STEP, steps=1)
-        self.turn()
+        self.tick()
 
     @property
     def state(self) -> CameraState:
@@ -54,7 +54,7 @@ class Cell:
 @pytest.fixture
 def cell(tmp_path: Path) -> Cell:
     made = Cell(tmp_path / "store")
-    made.turn()
+    made.tick()
     return made
 
 
@@ -69,12 +69,12 @@ def test_it_is_begun_at_once_and_watched_from_its_first_step(cell: Cell) -> None
 def test_a_process_that_dies_goes_on_with_its_run(cell: Cell) -> None:
     cell.step()
     cell.bench.last.code = -9
-    cell.turn(5.0)
+    cell.tick(5.0)
     assert cell.state is CameraState.WAITING
     assert "its process died (signal 9); restarting in 1 s" in cell.bench.lines[-1]
-    cell.turn(0.9)
+    cell.tick(0.9)
     assert len(cell.bench.children) == 1
-    cell.turn(0.2)
+    cell.tick(0.2)
     first, second = cell.bench.children
     assert second.job.resume
     assert second.job.folder == first.job.folder
@@ -90,19 +90,19 @@ def test_a_process_that_hangs_is_ended(cell: Cell, stepped: bool, away: bool, mo
         cell.step()
     if away:
         cell.bench.last.tell(NOTICE, text="it delivers no frames; trying again.")
-        cell.turn()
-    cell.turn(most)
+        cell.tick()
+    cell.tick(most)
     assert cell.bench.running
-    cell.turn(0.1)
+    cell.tick(0.1)
     assert not cell.bench.running
-    cell.turn()
+    cell.tick()
     assert cell.state is CameraState.WAITING
 
 
 def test_a_sign_of_life_is_enough(cell: Cell) -> None:
     for _ in range(20):
         cell.step()
-        cell.turn(9.0)
+        cell.tick(9.0)
     assert len(cell.bench.children) == 1
     assert cell.bench.running
 
@@ -110,10 +110,10 @@ def test_a_sign_of_life_is_enough(cell: Cell) -> None:
 def test_a_process_that_swells_closes_and_goes_on_smaller(cell: Cell) -> None:
     cell.step()
     cell.bench.last.memory = 1000.1
-    cell.turn(1.0)
+    cell.tick(1.0)
     assert cell.bench.last.asked == 1
-    cell.turn()
-    cell.turn()
+    cell.tick()
+    cell.tick()
     assert len(cell.bench.children) == 2
     assert cell.bench.last.job.resume
     assert any("1000 MB in use, 1000 allowed" in line for line in cell.bench.lines)
@@ -125,8 +125,8 @@ def test_a_state_that_ends_every_process_is_left(cell: Cell) -> None:
     resumed = []
     for _ in range(5):
         cell.bench.last.code = -11
-        cell.turn()
-        cell.turn(LONGEST_WAIT_S)
+        cell.tick()
+        cell.tick(MAX_WAIT_S)
         resumed.append(cell.bench.last.job.resume)
     assert resumed == [True, True, True, False, False]
     assert cell.bench.last.job.folder != first
@@ -138,12 +138,12 @@ def test_a_run_that_is_refused_is_left_but_not_for_a_camera_that_is_away(
 ) -> None:
     cell.step()
     cell.bench.last.code = -9
-    cell.turn()
-    cell.turn(1.0)
+    cell.tick()
+    cell.tick(1.0)
     cell.bench.last.tell(REFUSED, text="no", source=because_of_the_source)
     cell.bench.last.code = 2
-    cell.turn()
-    cell.turn(10.0)
+    cell.tick()
+    cell.tick(10.0)
     assert cell.bench.last.job.resume is goes_on
 
 
@@ -156,7 +156,7 @@ def test_a_file_is_seen_once_and_a_camera_for_ever(
     cell.step()
     cell.bench.last.tell(ENDED, live=live, verdict=None, steps=7, problem=None)
     cell.bench.last.code = 0
-    cell.turn()
+    cell.tick()
     assert cell.state is state
     assert "verdict none after 7 frames" in cell.bench.lines[-1]
 
@@ -167,7 +167,7 @@ def test_what_the_service_stopped_itself_is_not_said_to_be_stopped_by_the_user(c
     problem = {"problem": "stopped by the user", "stopped": True}
     cell.bench.last.tell(ENDED, live=True, verdict="failed", steps=7, **problem)
     cell.bench.last.code = 0
-    cell.turn()
+    cell.tick()
     assert cell.bench.lines[-1].endswith("verdict failed after 7 frames; it is no longer watched")
 
 
@@ -178,9 +178,9 @@ def test_a_stop_takes_no_longer_than_it_may(cell: Cell, stubborn: bool) -> None:
     cell.supervisor.stop(cell.now)
     begun = cell.now
     while cell.state is not CameraState.OVER:
-        cell.turn(0.1)
-        assert cell.now - begun <= CLOSE_S + 0.3
-    assert cell.supervisor.killed_at_close is stubborn
+        cell.tick(0.1)
+        assert cell.now - begun <= KILL_AFTER_S + 0.3
+    assert cell.supervisor.killed_on_close is stubborn
     assert cell.bench.last.asked == (2 if stubborn else 1)
     assert cell.bench.last.closed
 
@@ -188,8 +188,8 @@ def test_a_stop_takes_no_longer_than_it_may(cell: Cell, stubborn: bool) -> None:
 def test_other_settings_are_taken_up_after_a_good_end(cell: Cell) -> None:
     cell.step()
     cell.supervisor.replace(site_camera(source="1", fingerprint="b"), cell.now)
-    cell.turn(0.1)
-    cell.turn(0.1)
+    cell.tick(0.1)
+    cell.tick(0.1)
     first, second = cell.bench.children
     assert (first.asked, first.closed) == (1, True)
     assert second.job.settings.source == "1"
@@ -199,19 +199,19 @@ def test_other_settings_are_taken_up_after_a_good_end(cell: Cell) -> None:
 def test_another_sink_is_taken_up_with_all_that_is_believed(cell: Cell) -> None:
     cell.step()
     cell.supervisor.replace(site_camera(source="1", fingerprint="a"), cell.now)
-    cell.turn(0.1)
-    cell.turn(0.1)
+    cell.tick(0.1)
+    cell.tick(0.1)
     assert cell.bench.last.job.resume
 
 
 def test_a_store_that_cannot_be_written_is_tried_again(tmp_path: Path) -> None:
     (tmp_path / "store").write_text("no folder")
     cell = Cell(tmp_path / "store")
-    cell.turn()
+    cell.tick()
     assert not cell.bench.children
     assert "next try in 1 s" in cell.bench.lines[-1]
     (tmp_path / "store").unlink()
-    cell.turn(1.0)
+    cell.tick(1.0)
     assert cell.bench.running
 
 
@@ -228,10 +228,10 @@ def test_whatever_happens_there_is_one_process_and_it_can_be_stopped(
 ) -> None:
     cell = Cell(tmp_path_factory.mktemp("store") / str(next(COUNT)))
     for number, act in enumerate(acts):
-        cell.turn(0.5)
+        cell.tick(0.5)
         running = cell.bench.running
         assert len(running) <= 1
-        later = {"wait": 2.0, "long": LONGEST_WAIT_S}.get(act, 0.0)
+        later = {"wait": 2.0, "long": MAX_WAIT_S}.get(act, 0.0)
         for child in running:
             if act == "step":
                 cell.step()
@@ -248,15 +248,15 @@ def test_whatever_happens_there_is_one_process_and_it_can_be_stopped(
                 child.stubborn = True
         if act == "replace":
             cell.supervisor.replace(site_camera(source=str(number)), cell.now)
-        cell.turn(later)
+        cell.tick(later)
     for _ in range(200):  # left alone it is watched, or begun again soon
-        cell.turn(0.5)
+        cell.tick(0.5)
         if cell.bench.running:
             break
     assert cell.bench.running
     cell.supervisor.stop(cell.now)
     for _ in range(20):
-        cell.turn(0.5)
+        cell.tick(0.5)
     assert cell.state is CameraState.OVER
     assert not cell.bench.running
     assert all(child.closed for child in cell.bench.children)

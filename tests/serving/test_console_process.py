@@ -18,9 +18,9 @@ from tests.archive.recordings import meeting, record
 from tests.serving.fakes import Bench, site_camera
 from visup.serving.console_process import (
     ConsoleProcess,
-    begun,
     console_command,
     console_environment,
+    start_process,
 )
 from visup.serving.site.records import Site, SiteConsole
 from visup.serving.site_log import SiteEvent
@@ -42,12 +42,14 @@ class Scene:
         self.begun: list[subprocess.Popen[bytes]] = []
 
     def begin(self, command: Sequence[str], tokens: Mapping[str, str]) -> subprocess.Popen[bytes]:
-        self.begun.append(begun((sys.executable, "-c", "import time; time.sleep(60)"), tokens))
+        self.begun.append(
+            start_process((sys.executable, "-c", "import time; time.sleep(60)"), tokens)
+        )
         return self.begun[-1]
 
-    def turn(self, later_s: float = 0.1) -> None:
+    def tick(self, later_s: float = 0.1) -> None:
         self.now += later_s
-        self.console.turn(self.supervisor, self.now)
+        self.console.tick(self.supervisor, self.now)
 
     def kill(self) -> None:
         self.begun[-1].kill()
@@ -60,18 +62,18 @@ def scene(tmp_path: Path) -> Scene:
 
 
 def test_it_is_begun_again_ever_more_seldom_and_no_camera_notices(scene: Scene) -> None:
-    scene.turn()
-    scene.turn()
+    scene.tick()
+    scene.tick()
     assert len(scene.begun) == 1
     for wait in (1.0, 2.0, 4.0):
         scene.kill()
-        scene.turn()
+        scene.tick()
         assert scene.bench.lines[-1].endswith(
             f"the console ended (signal 9); restarting in {wait:g} s"
         )
-        scene.turn(wait - 0.2)
+        scene.tick(wait - 0.2)
         count = len(scene.begun)
-        scene.turn(0.4)
+        scene.tick(0.4)
         assert len(scene.begun) == count + 1
     assert scene.bench.children == []
     assert scene.bench.kinds.count(SiteEvent.CONSOLE_ENDED) == 3
@@ -80,17 +82,17 @@ def test_it_is_begun_again_ever_more_seldom_and_no_camera_notices(scene: Scene) 
 
 
 def test_what_changed_in_the_site_file_is_taken_up(scene: Scene) -> None:
-    scene.turn()
+    scene.tick()
     changed = replace(scene.site, console=replace(CONSOLE, listen=("127.0.0.1", 8087)))
     scene.supervisor.reload(changed, scene.now)
-    scene.turn()
+    scene.tick()
     assert scene.begun[0].poll() is not None
     assert len(scene.begun) == 2
     assert scene.bench.lines[-1].endswith("the console is at http://127.0.0.1:8087/")
     scene.supervisor.reload(replace(scene.site, console=None), scene.now)
-    scene.turn()
+    scene.tick()
     assert scene.begun[1].poll() is not None
-    scene.turn(99.0)
+    scene.tick(99.0)
     assert len(scene.begun) == 2
 
 
@@ -101,7 +103,7 @@ def test_one_that_cannot_be_begun_stops_nothing(tmp_path: Path) -> None:
         raise OSError(12, "Cannot allocate memory")
 
     scene.console = ConsoleProcess(tmp_path, scene.bench.tell, fail)
-    scene.turn()
+    scene.tick()
     assert "cannot be started (Cannot allocate memory)" in scene.bench.lines[-1]
 
 
@@ -109,7 +111,7 @@ def test_tokens_are_no_part_of_the_command_or_of_what_is_told(scene: Scene) -> N
     console = replace(CONSOLE, names=("cell.example",), save_to=Path("own"))
     command = console_command(console, Path("store"))
     assert command[-6:] == ("--port", "8086", "--name", "cell.example", "--save-to", "own")
-    scene.turn()
+    scene.tick()
     scene.console.close()
     for token in (CONSOLE.token, CONSOLE.viewer_token or ""):
         assert token in console_environment(console).values()
@@ -124,7 +126,7 @@ def test_the_real_one_answers_and_ends_when_its_service_is_gone(tmp_path: Path) 
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     console = replace(CONSOLE, listen=("127.0.0.1", port))
-    process = begun(console_command(console, tmp_path), console_environment(console))
+    process = start_process(console_command(console, tmp_path), console_environment(console))
     cookie = {"Cookie": f"visup_console={CONSOLE.viewer_token}"}
     asked = urllib.request.Request(f"http://127.0.0.1:{port}/", headers=cookie)
     try:

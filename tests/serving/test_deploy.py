@@ -7,8 +7,8 @@ import tomllib
 from pathlib import Path
 
 from tests.paths import ROOT
-from visup.serving.camera_supervisor import CLOSE_S
-from visup.serving.site_supervisor import TURN_S
+from visup.serving.camera_supervisor import KILL_AFTER_S
+from visup.serving.site_supervisor import TICK_S
 
 DEPLOY = ROOT / "deploy"
 
@@ -22,8 +22,8 @@ def unit() -> dict[str, str]:
 def test_the_service_manager_waits_longer_than_the_service_needs() -> None:
     told = unit()
     assert told["Type"] == "notify"
-    assert float(told["WatchdogSec"]) > 100 * TURN_S
-    assert float(told["TimeoutStopSec"]) > CLOSE_S + 5.0
+    assert float(told["WatchdogSec"]) > 100 * TICK_S
+    assert float(told["TimeoutStopSec"]) > KILL_AFTER_S + 5.0
     # The processes of cameras are the supervisor's to end.
     assert told["KillMode"] == "mixed"
     assert told["ExecReload"].endswith("-HUP $MAINPID")

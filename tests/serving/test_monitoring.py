@@ -30,7 +30,7 @@ def test_sums_over_processes_never_go_back(lives: list[list[int]]) -> None:
     figures, last = CameraFigures(), 0.0
     for life in lives:
         for count in life:
-            figures.take({"frames": count, "objects": 3, "text": "x", "lag_s": None})
+            figures.update({"frames": count, "objects": 3, "text": "x", "lag_s": None})
             assert figures.totals["frames"] >= last
             last = figures.totals["frames"]
         figures.process_ended()
@@ -42,15 +42,15 @@ def test_sums_over_processes_never_go_back(lives: list[list[int]]) -> None:
 def test_what_a_process_tells_is_seen_from_outside(tmp_path: Path) -> None:
     bench = Bench()
     one = CameraSupervisor(site_camera(), tmp_path, bench.tell, bench.start)
-    one.turn(0.0)
+    one.tick(0.0)
     assert one.status(0.0).state == "starting"
     bench.last.tell(ReportKind.STEP, frames=5, dropped=1, lag_s=0.25, ms_perceive=40.0)
-    one.turn(1.0)
+    one.tick(1.0)
     bench.last.kill()
-    one.turn(2.0)
-    one.turn(4.0)
+    one.tick(2.0)
+    one.tick(4.0)
     bench.last.tell(ReportKind.STEP, frames=2, dropped=0, lag_s=0.5, ms_perceive=10.0)
-    one.turn(5.0)
+    one.tick(5.0)
     status = one.status(7.0)
     assert (status.state, status.restarts, status.step_age_s) == ("watching", 1, 2.0)
     assert status.totals == {"frames": 7.0, "dropped": 1.0, "ms_perceive": 50.0}

@@ -11,20 +11,20 @@ from tests.serving.fakes import begun_journal
 from visup.agent.model.errors import OutputError
 from visup.agent.storage.journal import Journal
 from visup.agent.storage.journal_reader import JOURNAL
-from visup.serving.run_store import CURRENT, begin_run, run_under_way
+from visup.serving.run_store import CURRENT, begin_run, resumable_run
 
 NOON = datetime(2026, 11, 23, 12, 0, 5, tzinfo=UTC)
 
 
 def test_a_run_that_was_begun_goes_on_under_the_same_settings_alone(tmp_path: Path) -> None:
     folder = tmp_path / "store" / "cell"
-    assert run_under_way(folder, "a") is None
+    assert resumable_run(folder, "a") is None
     run = begin_run(folder, "a", NOON)
     assert run == folder / "20261123T120005Z"
-    assert run_under_way(folder, "a") is None  # nothing was recorded
+    assert resumable_run(folder, "a") is None  # nothing was recorded
     begun_journal(run)
-    assert run_under_way(folder, "a") == run
-    assert run_under_way(folder, "b") is None
+    assert resumable_run(folder, "a") == run
+    assert resumable_run(folder, "b") is None
 
 
 def test_a_run_whose_source_was_seen_to_the_end_does_not_go_on(tmp_path: Path) -> None:
@@ -32,10 +32,10 @@ def test_a_run_whose_source_was_seen_to_the_end_does_not_go_on(tmp_path: Path) -
     run.mkdir()
     journal = Journal(run / JOURNAL)
     journal.note(ended="stopped")
-    assert run_under_way(tmp_path, "a") == run
+    assert resumable_run(tmp_path, "a") == run
     journal.note(ended="complete")
     journal.close()
-    assert run_under_way(tmp_path, "a") is None
+    assert resumable_run(tmp_path, "a") is None
 
 
 def test_names_are_in_utc_and_no_two_runs_have_the_same(tmp_path: Path) -> None:
@@ -59,14 +59,14 @@ def test_a_note_that_makes_no_sense_is_none(tmp_path: Path, text: str) -> None:
     (tmp_path / "cell").mkdir()
     begun_journal(tmp_path / "elsewhere")
     (tmp_path / "cell" / CURRENT).write_text(text)
-    assert run_under_way(tmp_path / "cell", "a") is None
+    assert resumable_run(tmp_path / "cell", "a") is None
 
 
 def test_a_damaged_journal_does_not_go_on(tmp_path: Path) -> None:
     run = begin_run(tmp_path, "a", NOON)
     run.mkdir()
     (run / JOURNAL).write_bytes(b"no journal")
-    assert run_under_way(tmp_path, "a") is None
+    assert resumable_run(tmp_path, "a") is None
 
 
 def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path) -> None:

@@ -31,13 +31,13 @@ def test_only_who_changed_is_touched(tmp_path: Path) -> None:
     bench = Bench()
     same, changed, gone = (site_camera(name) for name in ("same", "changed", "gone"))
     supervisor = SiteSupervisor(site(tmp_path, same, changed, gone), bench.tell, bench.start)
-    supervisor.turn(0.0)
+    supervisor.tick(0.0)
     first = {c.job.folder.parent.name: c for c in bench.children}
     new = site_camera("new")
     other = site_camera("changed", source="1", fingerprint="b")
     supervisor.reload(site(tmp_path, other, site_camera("same"), new), 1.0)
     for turn in range(5):
-        supervisor.turn(1.0 + turn)
+        supervisor.tick(1.0 + turn)
     running = {c.job.folder.parent.name: c for c in bench.running}
     assert set(running) == {"same", "changed", "new"}
     assert running["same"] is first["same"]
@@ -47,9 +47,9 @@ def test_only_who_changed_is_touched(tmp_path: Path) -> None:
     assert first["gone"].closed
     assert not supervisor.over
     supervisor.stop(9.0)
-    supervisor.turn(9.1)
+    supervisor.tick(9.1)
     assert supervisor.over
-    assert supervisor.closed_well
+    assert supervisor.closed_cleanly
 
 
 @pytest.mark.parametrize(("cores", "cameras", "threads"), [(8, 2, 4), (2, 3, 1), (None, 1, 1)])
@@ -59,7 +59,7 @@ def test_cameras_share_the_cores(
     monkeypatch.setattr(os, "cpu_count", lambda: cores)
     bench = Bench()
     all_of_them = [site_camera(f"camera{n}") for n in range(cameras)]
-    SiteSupervisor(site(tmp_path, *all_of_them), bench.tell, bench.start).turn(0.0)
+    SiteSupervisor(site(tmp_path, *all_of_them), bench.tell, bench.start).tick(0.0)
     assert [c.job.threads for c in bench.children] == [threads] * cameras
 
 

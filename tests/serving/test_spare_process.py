@@ -8,7 +8,7 @@ from tests.serving.fakes import Bench, FakeChild, begun_journal, site_camera
 from visup.serving.reports import CameraJob, ReportKind
 from visup.serving.site.records import Site
 from visup.serving.site_supervisor import SiteSupervisor
-from visup.serving.spare_process import PAUSE_S, SpareProcess
+from visup.serving.spare_process import SETTLE_S, SpareProcess
 
 
 class ReadyChild(FakeChild):
@@ -18,7 +18,7 @@ class ReadyChild(FakeChild):
         self.spare = job is None
         super().__init__(job)  # type: ignore[arg-type]
 
-    def give(self, job: CameraJob) -> None:
+    def send_job(self, job: CameraJob) -> None:
         self.job = job
         begun_journal(job.folder)
 
@@ -39,38 +39,38 @@ class Scene:
         self.begun.append(ReadyChild(job))
         return self.begun[-1]
 
-    def turn(self, later_s: float = 0.1) -> None:
+    def tick(self, later_s: float = 0.1) -> None:
         self.now += later_s
-        self.supervisor.turn(self.now)
-        self.spare.turn(self.supervisor, self.now)
+        self.supervisor.tick(self.now)
+        self.spare.tick(self.supervisor, self.now)
 
     def all_watch(self) -> None:
         for child in self.begun:
             if child.job and child.code is None:
                 begun_journal(child.job.folder)
                 child.tell(ReportKind.STEP, steps=1)
-        self.turn()
+        self.tick()
 
 
 def test_it_stands_ready_once_all_is_calm_and_takes_the_next_job(tmp_path: Path) -> None:
     scene = Scene(tmp_path)
-    scene.turn()
-    scene.turn(10 * PAUSE_S)
+    scene.tick()
+    scene.tick(10 * SETTLE_S)
     assert [c.spare for c in scene.begun] == [False, False]  # nobody watches yet
     scene.all_watch()
-    scene.turn(PAUSE_S)
+    scene.tick(SETTLE_S)
     assert [c.spare for c in scene.begun] == [False, False, True]
     victim = scene.begun[0]
     victim.kill()
-    scene.turn()
-    scene.turn(1.1)
+    scene.tick()
+    scene.tick(1.1)
     assert scene.begun[2].job.folder == victim.job.folder
     assert scene.begun[2].job.resume
     assert len(scene.begun) == 3
-    scene.turn(3 * PAUSE_S)
+    scene.tick(3 * SETTLE_S)
     assert len(scene.begun) == 3  # the camera has not come back yet
     scene.all_watch()
-    scene.turn(PAUSE_S)
+    scene.tick(SETTLE_S)
     assert scene.begun[3].spare
     scene.spare.close()
     assert scene.begun[3].code == -9
@@ -79,20 +79,20 @@ def test_it_stands_ready_once_all_is_calm_and_takes_the_next_job(tmp_path: Path)
 
 def test_one_that_dies_is_no_job_lost_and_is_begun_ever_more_seldom(tmp_path: Path) -> None:
     scene = Scene(tmp_path)
-    scene.turn()
+    scene.tick()
     scene.all_watch()
-    scene.turn(PAUSE_S)
+    scene.tick(SETTLE_S)
     scene.begun[2].kill()
     scene.begun[0].kill()
-    scene.turn(0.0)
-    scene.turn(1.1)
+    scene.tick(0.0)
+    scene.tick(1.1)
     again = scene.begun[-1]
     assert not again.spare
     assert again.job.folder == scene.begun[0].job.folder
     scene.all_watch()
     spares = len([c for c in scene.begun if c.spare])
     for _ in range(100):
-        scene.turn(1.0)
+        scene.tick(1.0)
         if scene.begun[-1].spare and scene.begun[-1].code is None:
             scene.begun[-1].kill()
     assert len([c for c in scene.begun if c.spare]) - spares < 10

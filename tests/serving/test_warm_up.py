@@ -22,6 +22,6 @@ def test_a_camera_that_pans_is_part_of_the_warm_up(monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(warm_up, "MotionSegmenter", Watched)
     warm_up.warm_up_moving_camera()
-    assert len(sizes) == warm_up.PANNED_FRAMES
+    assert len(sizes) == warm_up.PAN_FRAMES
     assert len(set(sizes)) == 1, "another size would begin anew"
     assert all(moves[1:])

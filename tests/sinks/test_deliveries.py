@@ -21,9 +21,9 @@ from visup.runs.inputs.audience import Audience
 from visup.runs.resume import interrupted_run
 from visup.runs.runner import fresh_folder, supervised
 from visup.runs.settings import RunOptions, WatchSettings
-from visup.sinks import delivery_log, insistent_outbox
+from visup.sinks import delivery_log, durable_outbox
 from visup.sinks.delivery_log import DELIVERY, DeliveryLog
-from visup.sinks.insistent_outbox import InsistentOutbox
+from visup.sinks.durable_outbox import DurableOutbox
 from visup.sinks.lines import JsonLines
 from visup.sinks.webhook import DeliveryError
 
@@ -44,12 +44,12 @@ def test_every_sink_gets_every_record_in_order_whoever_is_killed(
         if act.startswith("tell"):
             count = 1 + act.endswith("two")
             log.add(["a", "b"], [{"n": told + i} for i in range(count)], frame)
-            assert log.told_frame == frame
+            assert log.last_frame == frame
             told, frame = told + count, frame + 1
         elif act == "kill":
             log.close()
             log = DeliveryLog(path)
-            assert log.told_frame == frame - 1
+            assert log.last_frame == frame - 1
         elif waiting := log.oldest(act[-1]):
             got[act[-1]].append(waiting[1]["n"])
             log.done(waiting[0])
@@ -65,7 +65,7 @@ def test_every_sink_gets_every_record_in_order_whoever_is_killed(
 def test_of_too_many_the_oldest_are_lost_and_counted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(delivery_log, "MOST_WAITING", 3)
+    monkeypatch.setattr(delivery_log, "MAX_WAITING", 3)
     log = DeliveryLog(tmp_path / "d.sqlite")
     assert [log.add(["a"], [{"n": n}]) for n in range(5)] == [0, 0, 0, 1, 1]
     found = log.oldest("a")
@@ -100,7 +100,7 @@ class Flaky:
 
 @pytest.fixture
 def log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[DeliveryLog]:
-    monkeypatch.setattr(insistent_outbox, "FIRST_WAIT_S", 0.01)
+    monkeypatch.setattr(durable_outbox, "INITIAL_WAIT_S", 0.01)
     made = DeliveryLog(tmp_path / "d.sqlite")
     yield made
     made.close()
@@ -116,7 +116,7 @@ def wait_for(what: Callable[[], object]) -> None:
 def test_a_sink_that_was_down_gets_all_and_a_refusal_holds_up_nobody(log: DeliveryLog) -> None:
     down = [OSError("down"), OSError("down")]
     sink = Flaky(*down, None, DeliveryError("no", final=True))
-    outbox = InsistentOutbox(sink, "0", log)
+    outbox = DurableOutbox(sink, "0", log)
     log.add(["0"], [{"n": n} for n in range(4)])
     outbox.wake()
     wait_for(lambda: log.count("0") == 0)
@@ -129,7 +129,7 @@ def test_a_sink_that_was_down_gets_all_and_a_refusal_holds_up_nobody(log: Delive
 
 
 def test_one_that_stays_down_is_told_and_ends_in_time(log: DeliveryLog) -> None:
-    outbox = InsistentOutbox(Flaky(*[OSError("down")] * 1000), "0", log)
+    outbox = DurableOutbox(Flaky(*[OSError("down")] * 1000), "0", log)
     log.add(["0"], [{"n": 1}])
     outbox.wake()
     wait_for(lambda: outbox.fault)

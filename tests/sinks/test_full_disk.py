@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 
 from tests.full_disk import no_room
 from tests.sinks.test_deliveries import Flaky, wait_for
-from visup.sinks import delivery_log, insistent_outbox
+from visup.sinks import delivery_log, durable_outbox
 from visup.sinks.delivery_log import DELIVERY, DeliveryLog
-from visup.sinks.insistent_outbox import InsistentOutbox
+from visup.sinks.durable_outbox import DurableOutbox
 
 
 def alert(number: int, state: str = "opened", text: str = "") -> dict[str, Any]:
@@ -50,7 +50,7 @@ def test_without_room_hundreds_of_alerts_are_noted_and_crossed_off(
             if part < restarts:
                 log.close()
                 log = DeliveryLog(path)
-        assert log.told_frame == 100 * (restarts + 1) - 1
+        assert log.last_frame == 100 * (restarts + 1) - 1
         for sink in ("a", "b"):
             assert [r["id"] for r in taken(log, sink)] == list(range(100 * (restarts + 1)))
     log.close()
@@ -66,7 +66,7 @@ def test_when_even_the_reserve_is_used_up_nothing_of_a_step_is_noted(tmp_path: P
     with no_room(tmp_path), pytest.raises(sqlite3.Error):
         fill()
     ids = [(r["id"], r["state"]) for r in taken(log, "a")]
-    assert ids == [(n, s) for n in range(log.told_frame + 1) for s in ("opened", "closed")]
+    assert ids == [(n, s) for n in range(log.last_frame + 1) for s in ("opened", "closed")]
     log.close()
 
 
@@ -109,7 +109,7 @@ def test_the_name_of_a_delivery_follows_from_its_alert(tmp_path: Path) -> None:
 def test_one_that_was_sent_and_cannot_be_crossed_off_is_not_sent_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(insistent_outbox, "FIRST_WAIT_S", 0.01)
+    monkeypatch.setattr(durable_outbox, "INITIAL_WAIT_S", 0.01)
     log = DeliveryLog(tmp_path / "d.sqlite")
     faults = [sqlite3.OperationalError("database or disk is full")] * 3
     done = log.done
@@ -121,7 +121,7 @@ def test_one_that_was_sent_and_cannot_be_crossed_off_is_not_sent_again(
 
     monkeypatch.setattr(log, "done", failing)
     sink = Flaky()
-    outbox = InsistentOutbox(sink, "0", log)
+    outbox = DurableOutbox(sink, "0", log)
     log.add(["0"], [{"n": 1}])
     log.add(["0"], [{"n": 2}])
     outbox.wake()
@@ -164,7 +164,7 @@ def test_a_file_of_an_earlier_version_is_taken_over(tmp_path: Path) -> None:
     )
     db.close()
     log = DeliveryLog(path)
-    assert log.told_frame == 7
+    assert log.last_frame == 7
     log.add(["a"], [alert(2)], 8)
     assert [r["id"] for r in taken(log, "a")] == [1, 2]
     log.close()

@@ -58,7 +58,7 @@ class Slow:
 
 def test_a_slow_sink_holds_nobody_up_and_what_it_misses_is_counted_and_told() -> None:
     slow = Slow()
-    box = Outbox(slow, most=5)
+    box = Outbox(slow, max_length=5)
     begin = time.perf_counter()
     for n in range(100):
         box.offer(n)

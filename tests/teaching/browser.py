@@ -94,10 +94,10 @@ class Browser:
         os.write(self._write, json.dumps(asked).encode() + b"\0")
         end = time.monotonic() + PATIENCE_S
         while True:
-            told = self._message(end)
-            if told.get("id") == self._count:
-                assert "error" not in told, told["error"]
-                return dict(told["result"])
+            answer = self._message(end)
+            if answer.get("id") == self._count:
+                assert "error" not in answer, answer["error"]
+                return dict(answer["result"])
 
     def _message(self, end: float) -> dict[str, Any]:
         while b"\0" not in self._left:
@@ -115,9 +115,9 @@ class Browser:
 
     def value(self, script: str) -> Any:
         """What a script gives in the page."""
-        told = self.call("Runtime.evaluate", expression=script, returnByValue=True)
-        assert "exceptionDetails" not in told, told["exceptionDetails"]
-        return told["result"].get("value")
+        answer = self.call("Runtime.evaluate", expression=script, returnByValue=True)
+        assert "exceptionDetails" not in answer, answer["exceptionDetails"]
+        return answer["result"].get("value")
 
     def until(self, script: str) -> Any:
         """Wait until a script gives something that is true."""
@@ -167,12 +167,12 @@ class Browser:
         """Press keys one after the other."""
         for key in keys:
             code = KEYS.get(key, ord(key.upper()) if len(key) == 1 else 0)
-            told = {"key": key, "windowsVirtualKeyCode": code, "modifiers": 8 if shift else 0}
+            answer = {"key": key, "windowsVirtualKeyCode": code, "modifiers": 8 if shift else 0}
             text = (
                 {"text": "\r" if key == "Enter" else key} if len(key) == 1 or key == "Enter" else {}
             )
-            self.call("Input.dispatchKeyEvent", type="keyDown", **told, **text)
-            self.call("Input.dispatchKeyEvent", type="keyUp", **told)
+            self.call("Input.dispatchKeyEvent", type="keyDown", **answer, **text)
+            self.call("Input.dispatchKeyEvent", type="keyUp", **answer)
 
     def type(self, text: str) -> None:
         """Type into whatever has the focus."""

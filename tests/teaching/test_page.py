@@ -58,11 +58,11 @@ def test_frames_and_facts_are_served(page: TeachingPage) -> None:
 def test_what_is_posted_is_stored_and_told(page: TeachingPage, tmp_path: Path) -> None:
     status, data = ask(page, "POST", f"{page.prefix}save", things())
     assert status == 200
-    assert json.loads(data)["told"][0] == f"part: {SIDE} x {SIDE} pixels at (23, {TOP})."
+    assert json.loads(data)["messages"][0] == f"part: {SIDE} x {SIDE} pixels at (23, {TOP})."
     ask(page, "POST", f"{page.prefix}save", things("tray", 5))
-    assert page.lesson is not None
-    assert [v.name for v in page.lesson.views] == ["part", "tray"]
-    assert [t.partition(":")[0] for t in page.lesson.told[:2]] == ["part", "tray"]
+    assert page.result is not None
+    assert [v.name for v in page.result.views] == ["part", "tray"]
+    assert [t.partition(":")[0] for t in page.result.messages[:2]] == ["part", "tray"]
     assert ModelDatabase.open(tmp_path / "a.models").names() == ("part", "tray")
 
 
@@ -100,7 +100,7 @@ def test_what_is_not_as_it_should_be_is_refused(
     assert found == status
     if status == 422:
         assert json.loads(data)["error"]
-    assert page.lesson is None
+    assert page.result is None
 
 
 def test_two_pages_have_two_addresses(tmp_path: Path) -> None:
@@ -196,7 +196,7 @@ def test_what_was_drawn_can_be_removed_and_must_be_named(
     browser.press_button("save")
     browser.until("document.getElementById('status').className === 'bad'")
     assert "name" in browser.value("document.getElementById('status').textContent")
-    assert page.lesson is None
+    assert page.result is None
     browser.press_button("done")
     assert "not stored" in browser.value("document.getElementById('status').textContent")
     assert not page.wait(0.05)

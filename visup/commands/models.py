@@ -134,7 +134,7 @@ def learn(
     from visup.teaching.outlines import parse_things
 
     lesson = learn_from(run, models, parse_things(thing or ()), source, views)
-    for sentence in lesson.told:
+    for sentence in lesson.messages:
         echo(sentence)
     out = out or models.with_name(f"{models.stem}-taught.png")
     write_picture(out, taught_views_sheet(lesson.views))

@@ -14,7 +14,7 @@ from visup.terminal.console import echo
 
 if TYPE_CHECKING:
     from visup.teaching.clip_frames import ClipFrames
-    from visup.teaching.lesson import Lesson
+    from visup.teaching.outline_teaching import TeachingResult
 
 
 class OutlineCommand(TyperCommand):
@@ -67,7 +67,7 @@ def teach(
     if lesson is None:
         echo("Nothing was stored.")
         return
-    for sentence in lesson.told:
+    for sentence in lesson.messages:
         echo(sentence)
     _draw(lesson, out or models.with_name(f"{models.stem}-taught.png"))
 
@@ -79,9 +79,9 @@ def _lesson(
     outlines: Sequence[str],
     brief: Path | None,
     browser: bool,
-) -> Lesson | None:
+) -> TeachingResult | None:
     from visup.teaching.clip_frames import ClipFrames
-    from visup.teaching.lesson import teach_brief, teach_outlines
+    from visup.teaching.outline_teaching import teach_brief, teach_outlines
     from visup.teaching.outlines import parse_outline
 
     if brief is not None and (outlines or clip is not None):
@@ -103,7 +103,9 @@ def _lesson(
         return _in_the_browser(frames, frame, models, browser)
 
 
-def _in_the_browser(frames: ClipFrames, frame: int, models: Path, browser: bool) -> Lesson | None:
+def _in_the_browser(
+    frames: ClipFrames, frame: int, models: Path, browser: bool
+) -> TeachingResult | None:
     from visup.teaching.page.server import TeachingPage
 
     frames.at(frame)
@@ -116,10 +118,10 @@ def _in_the_browser(frames: ClipFrames, frame: int, models: Path, browser: bool)
             page.wait()
         except KeyboardInterrupt:
             echo()
-        return page.lesson
+        return page.result
 
 
-def _draw(lesson: Lesson, out: Path) -> None:
+def _draw(lesson: TeachingResult, out: Path) -> None:
     from visup.commands.models import write_picture
     from visup.percepts.taught.drawing_views import taught_views_sheet
 

@@ -30,7 +30,7 @@ from visup.runs.result import RunResult
 from visup.runs.resume import InterruptedRun, catch_up
 from visup.runs.runtime_faults import RuntimeFaults
 from visup.runs.settings import RunOptions, WatchSettings
-from visup.runs.unattended.next_run import RollOver, RunPlaces
+from visup.runs.unattended.next_run import RollOver, RunFolders
 from visup.runs.unattended.phase_meter import PhaseMeter
 from visup.runs.wiring import VerdictMonitor, build_agent, closing_notes, final_verdict, open_video
 from visup.sinks import Sinks
@@ -178,7 +178,12 @@ class _SupervisedRun:
         past, restored = self._load_state(past)
         on_step = self._recorder.catch_up if self._recorder else lambda step, frame: None
         frames, notes = catch_up(
-            self._agent, self.source, past, on_step, self._sinks.alerts.late, restored=restored
+            self._agent,
+            self.source,
+            past,
+            on_step,
+            self._sinks.alerts.send_missed,
+            restored=restored,
         )
         self._notes = (*self._notes, *notes)
         return frames
@@ -274,7 +279,7 @@ class _SupervisedRun:
                         self._agent, step, lambda: recorder_state(self._recorder)
                     )
                 self._report_figures(step, audience)
-                if audience.places and self._recorder and self.source.live:
+                if audience.run_folders and self._recorder and self.source.live:
                     self._roll(step, self._recorder, audience)
                 yield step
         except KeyboardInterrupt:
@@ -282,10 +287,10 @@ class _SupervisedRun:
 
     def _roll(self, step: Step, old: Recorder, audience: Audience) -> None:
         """Start the next run if it is due: the same agent with a new journal."""
-        if not (audience.places and self._roll_over.due(step.time, old.journal.size)):
+        if not (audience.run_folders and self._roll_over.due(step.time, old.journal.size)):
             return
         try:
-            new, checkpoints = self._next_recorder(step, old, audience.places)
+            new, checkpoints = self._next_recorder(step, old, audience.run_folders)
         except OutputError as fault:
             self._roll_over.failed(step.time)
             if audience.notice:
@@ -305,21 +310,21 @@ class _SupervisedRun:
         self._roll_over.finish_files(old, before, result, mind.tasks)
 
     def _next_recorder(
-        self, step: Step, old: Recorder, places: RunPlaces
+        self, step: Step, old: Recorder, run_folders: RunFolders
     ) -> tuple[Recorder, CheckpointWriter]:
         """The journal and the checkpoint of the next run, from which it can already be resumed.
 
         Raises:
             OutputError: They cannot be written.
         """
-        folder = fresh_folder(places.place(), self._settings.source)
+        folder = fresh_folder(run_folders.next_folder(), self._settings.source)
         new: Recorder | None = None
         try:
             new = Recorder(self._settings, self.source, folder, self._options)
             new.journal.note(continues=old.folder.name, clock=self._stamp.clock.anchors)
             checkpoints = CheckpointWriter(folder, self._options.state_every_s)
             checkpoints.keep(self._agent, step, recorder_state(new))
-            places.go_on_with(folder)
+            run_folders.set_current(folder)
         except OutputError:
             if new:
                 new.close()

@@ -3,6 +3,6 @@
 Read `site/` (the site file), then `site_supervisor.py` (all cameras), `camera_supervisor.py` (one camera,
 with `backoff.py` and `run_store.py`), `camera_child.py` and `camera_process.py` (the two ends of a process,
 which communicate by `reports.py`; `spare_process.py` and `warm_up.py` speed up restarts). `service.py`
-combines them with the auxiliary parts: `monitoring/` (health and metrics), `room/` (retention and disk
-space), `service_manager.py` (systemd).
+combines them with the auxiliary parts: `monitoring/` (health and metrics), `retention/` (how long runs are
+kept, and disk space), `service_manager.py` (systemd).
 """

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-FIRST_WAIT_S = 1.0
-LONGEST_WAIT_S = 60.0
-CALM_S = 20.0
+INITIAL_WAIT_S = 1.0
+MAX_WAIT_S = 60.0
+HEALTHY_S = 20.0
 """A process that ran at least this long counts as healthy and resets the backoff. Starting takes about 3 s of
 processor time, so one that crashes every 20 s costs little more than one that keeps running."""
 
@@ -28,8 +28,8 @@ class Backoff:
         >>> [Backoff(n).wait_s for n in (1, 2, 3, 9)]
         [1.0, 2.0, 4.0, 60.0]
         """
-        doubled = FIRST_WAIT_S * 2.0 ** min(self.failures - 1, 30)
-        return min(LONGEST_WAIT_S, doubled) if self.failures else 0.0
+        wait = INITIAL_WAIT_S * 2.0 ** min(self.failures - 1, 30)
+        return min(MAX_WAIT_S, wait) if self.failures else 0.0
 
     def after(self, ran_s: float) -> Backoff:
         """The state after the process ended again.
@@ -37,4 +37,4 @@ class Backoff:
         Args:
             ran_s: How long the process made steps, seconds.
         """
-        return replace(self, failures=1 if ran_s >= CALM_S else self.failures + 1)
+        return replace(self, failures=1 if ran_s >= HEALTHY_S else self.failures + 1)

@@ -10,12 +10,12 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from visup.serving.reports import LONGEST_LINE, CameraJob, CameraReport, job_line, parse_report
+from visup.serving.reports import MAX_LINE_BYTES, CameraJob, CameraReport, job_line, parse_report
 
 Command = Callable[[int], Sequence[str]]
 """The command line, given the file descriptor of the report pipe; tests substitute their own."""
 
-MOST_READ = 2**16
+READ_BYTES = 2**16
 
 
 def camera_command(pipe: int) -> Sequence[str]:
@@ -54,9 +54,9 @@ class CameraChild:
         self.pid = self._process.pid
         self._partial_line = b""
         if job:
-            self.give(job)
+            self.send_job(job)
 
-    def give(self, job: CameraJob) -> None:
+    def send_job(self, job: CameraJob) -> None:
         """Send the process its job."""
         self._send(job_line(job))
 
@@ -64,10 +64,10 @@ class CameraChild:
         """Reports received since the last call."""
         data = self._partial_line
         with suppress(BlockingIOError):
-            while piece := os.read(self._reports, MOST_READ):
+            while piece := os.read(self._reports, READ_BYTES):
                 data += piece
         *lines, self._partial_line = data.split(b"\n")
-        self._partial_line = self._partial_line[-LONGEST_LINE:]
+        self._partial_line = self._partial_line[-MAX_LINE_BYTES:]
         return [report for line in lines if (report := parse_report(line))]
 
     def exit_code(self) -> int | None:
@@ -97,7 +97,7 @@ class CameraChild:
         except (OSError, ValueError):
             return None
 
-    def ask_to_end(self) -> None:
+    def terminate(self) -> None:
         """Ask the process to finish its step and close its recording (SIGTERM)."""
         self._signal(signal.SIGTERM)
 
@@ -113,7 +113,7 @@ class CameraChild:
             self._process.wait(wait_s)
         self.close()
 
-    def let_go(self) -> None:
+    def close_stdin(self) -> None:
         """Stop supervising it: it closes its recording, as when its supervisor dies."""
         if self._process.stdin:
             with suppress(OSError):
@@ -121,7 +121,7 @@ class CameraChild:
 
     def close(self) -> None:
         """Release its resources, once it has ended."""
-        self.let_go()
+        self.close_stdin()
         os.close(self._reports)
 
     def _send(self, line: bytes) -> None:

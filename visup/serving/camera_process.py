@@ -42,7 +42,7 @@ CLOSING_S = 10.0
 DELIVERIES = "deliveries.sqlite"
 """In the folder of a camera: alerts that its sinks have not accepted yet."""
 
-BEAT_S = 0.5
+HEARTBEAT_S = 0.5
 """Seconds between heartbeats."""
 
 
@@ -52,8 +52,8 @@ class _ReportingRunStore(RunStore):
 
     pipe: ReportPipe
 
-    def go_on_with(self, run: Path) -> None:
-        RunStore.go_on_with(self, run)
+    def set_current(self, run: Path) -> None:
+        RunStore.set_current(self, run)
         self.pipe.send(ReportKind.ROLLED, run=run.name)
 
 
@@ -66,7 +66,7 @@ class Heartbeat:
 
     def __init__(self, pipe: ReportPipe) -> None:
         self._pipe = pipe
-        self._last = -BEAT_S
+        self._last = -HEARTBEAT_S
         self._frames = 0
         self._opened: Counter[str] = Counter()
         self._beliefs: dict[str, int] = {}
@@ -84,7 +84,7 @@ class Heartbeat:
     def beat(self, figures: RunFigures) -> None:
         """Send the counts if a heartbeat is due."""
         now = time.monotonic()
-        if now - self._last < BEAT_S:
+        if now - self._last < HEARTBEAT_S:
             return
         self._last = now
         phases = {PHASE + name: round(ms, 1) for name, ms in figures.phase_ms.items()}
@@ -109,11 +109,11 @@ def watch_camera(job: CameraJob, pipe: ReportPipe) -> ExitCode:
     """
     if job.threads is not None:
         cv2.setNumThreads(job.threads)
-    heart = Heartbeat(pipe)
+    heartbeat = Heartbeat(pipe)
     audience = Audience(
-        observers=(heart,),
-        figures=heart.beat,
-        places=_ReportingRunStore(job.folder.parent, job.fingerprint, pipe),
+        observers=(heartbeat,),
+        figures=heartbeat.beat,
+        run_folders=_ReportingRunStore(job.folder.parent, job.fingerprint, pipe),
         notice=lambda text: pipe.send(ReportKind.NOTICE, text=text),
     )
     try:
@@ -141,8 +141,8 @@ def watch_camera(job: CameraJob, pipe: ReportPipe) -> ExitCode:
 
 def _interrupted(job: CameraJob) -> InterruptedRun:
     """The run to resume, with the code and the password that the supervisor names."""
-    named = job.settings.source if has_secret(job.settings.source) else None
-    return interrupted_run(job.folder, job.settings.behaviours, job.settings.plugins, named)
+    source = job.settings.source if has_secret(job.settings.source) else None
+    return interrupted_run(job.folder, job.settings.behaviours, job.settings.plugins, source)
 
 
 def _report_end(result: RunResult, folder: Path, pipe: ReportPipe) -> None:

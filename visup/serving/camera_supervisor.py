@@ -14,12 +14,12 @@ from visup.serving.camera_child import CameraChild
 from visup.serving.monitoring.camera_figures import CameraFigures
 from visup.serving.monitoring.status import CameraStatus
 from visup.serving.reports import CameraJob, CameraReport, ReportKind
-from visup.serving.run_store import begin_run, run_under_way
+from visup.serving.run_store import begin_run, resumable_run
 from visup.serving.site.records import SiteCamera
-from visup.serving.site_log import SiteEvent, Tell
+from visup.serving.site_log import LogEvent, SiteEvent
 
-ASK_AGAIN_S = 2.5
-CLOSE_S = 5.0
+TERMINATE_AGAIN_S = 2.5
+KILL_AFTER_S = 5.0
 """Seconds after which a process that was asked to end is asked again (it may be waiting for a frame that does
 not come), and killed."""
 
@@ -61,7 +61,7 @@ class Child(Protocol):
         """Processor time used, seconds, or None."""
         ...
 
-    def ask_to_end(self) -> None:
+    def terminate(self) -> None:
         """Ask it to close its recording and end."""
         ...
 
@@ -75,18 +75,18 @@ class Child(Protocol):
 
 
 @dataclass(slots=True)
-class _Supervised:
+class _Process:
     """One process of the camera; times in seconds of the supervisor's clock."""
 
     child: Child
     resumed: bool
-    begun: float
-    heard: float
+    started: float
+    last_report: float
     first_step: float | None = None
     last_step: float | None = None
-    away: bool = False
-    asked: float | None = None
-    asked_twice: bool = False
+    source_lost: bool = False
+    terminated_at: float | None = None
+    terminated_twice: bool = False
     killed: bool = False
     end: CameraReport | None = None
 
@@ -113,44 +113,44 @@ class CameraSupervisor:
         self,
         camera: SiteCamera,
         store: Path,
-        tell: Tell,
+        log_event: LogEvent,
         start: Callable[[CameraJob], Child] = CameraChild,
     ) -> None:
         self.camera = camera
         self.state = CameraState.WAITING
         self.restarts = 0
-        self.killed_at_close = False
+        self.killed_on_close = False
         self.figures = CameraFigures()
         self.run: Path | None = None
         self._folder = store / camera.name
-        self._notify = tell
+        self._log_event = log_event
         self._start = start
-        self._process: _Supervised | None = None
-        self._due = 0.0
+        self._process: _Process | None = None
+        self._start_at = 0.0
         self._backoff = Backoff()
         self._failed_resumes = 0
         self._next_camera: SiteCamera | None = camera
 
-    def turn(self, now: float) -> None:
+    def tick(self, now: float) -> None:
         """Do what is due; call it several times a second.
 
         Args:
             now: Seconds of a monotonic clock.
         """
         if self._process:
-            self._listen(self._process, now)
-            self._limit(self._process, now)
+            self._read_reports(self._process, now)
+            self._enforce_limits(self._process, now)
             if (code := self._process.child.exit_code()) is not None:
-                self._ended(self._process, code, now)
-        elif self.state is CameraState.WAITING and now >= self._due:
-            self._begin(now)
+                self._process_ended(self._process, code, now)
+        elif self.state is CameraState.WAITING and now >= self._start_at:
+            self._start_process(now)
 
     def replace(self, camera: SiteCamera, now: float) -> None:
         """Change the settings: the process is asked to end and restarted with the new ones."""
         self._next_camera, self.camera = camera, camera
-        self._due, self._backoff, self._failed_resumes = now, Backoff(), 0
+        self._start_at, self._backoff, self._failed_resumes = now, Backoff(), 0
         if self._process:
-            self._ask(self._process, now)
+            self._terminate(self._process, now)
         else:
             self.state = CameraState.WAITING
 
@@ -158,33 +158,35 @@ class CameraSupervisor:
         """Stop watching; `state` is OVER once the process has ended."""
         self._next_camera = None
         if self._process:
-            self._ask(self._process, now)
+            self._terminate(self._process, now)
         else:
             self.state = CameraState.OVER
 
     def status(self, now: float) -> CameraStatus:
         """The state of the camera for monitoring."""
         process = self._process
-        self.figures.take({"cpu_s": process.child.cpu_s()} if process else {})
-        stepped = None if process is None or process.last_step is None else now - process.last_step
+        self.figures.update({"cpu_s": process.child.cpu_s()} if process else {})
+        step_age_s = (
+            None if process is None or process.last_step is None else now - process.last_step
+        )
         return CameraStatus(
             self.camera.name,
             self.state.value,
             self.restarts,
             process.child.memory_mb() if process else None,
-            stepped,
+            step_age_s,
             self.figures.totals,
             dict(self.figures.latest),
         )
 
-    def _tell(self, text: str, kind: SiteEvent, **facts: Any) -> None:
-        self._notify(self.camera.name, text, kind, **facts)
+    def _report_event(self, text: str, kind: SiteEvent, **facts: Any) -> None:
+        self._log_event(self.camera.name, text, kind, **facts)
 
-    def _begin(self, now: float) -> None:
+    def _start_process(self, now: float) -> None:
         camera = self.camera
         try:
             run = (
-                run_under_way(self._folder, camera.fingerprint)
+                resumable_run(self._folder, camera.fingerprint)
                 if self._failed_resumes < MAX_FAILED_RESUMES
                 else None
             )
@@ -199,108 +201,110 @@ class CameraSupervisor:
             child = self._start(job)
         except (VisupError, OSError) as fault:
             self._backoff = self._backoff.after(0.0)
-            self._due = now + self._backoff.wait_s
-            self._tell(
+            self._start_at = now + self._backoff.wait_s
+            self._report_event(
                 f"it cannot be started: {fault}; next try in {self._backoff.wait_s:g} s",
                 SiteEvent.NOT_BEGUN,
             )
             return
         self.run = folder
-        self._process = _Supervised(child, run is not None, now, now)
+        self._process = _Process(child, run is not None, now, now)
         self.state = CameraState.STARTING
-        verb, kind = ("resumes", SiteEvent.RESUMED) if run else ("starts", SiteEvent.BEGUN)
-        self._tell(f"{verb} run {folder.name}", kind, run=folder.name)
+        action, kind = ("resumes", SiteEvent.RESUMED) if run else ("starts", SiteEvent.BEGUN)
+        self._report_event(f"{action} run {folder.name}", kind, run=folder.name)
 
-    def _listen(self, process: _Supervised, now: float) -> None:
+    def _read_reports(self, process: _Process, now: float) -> None:
         for report in process.child.reports():
-            process.heard = now
+            process.last_report = now
             if report.kind is ReportKind.STEP:
-                process.away, process.last_step = False, now
-                self.figures.take(report.data)
+                process.source_lost, process.last_step = False, now
+                self.figures.update(report.data)
                 if process.first_step is None:
                     process.first_step, self._failed_resumes = now, 0
                     if self.state is CameraState.STARTING:
                         self.state = CameraState.WATCHING
             elif report.kind is ReportKind.NOTICE:
-                process.away = True
-                self._tell(_text(report.data.get("text")), SiteEvent.NOTICE)
+                process.source_lost = True
+                self._report_event(_text(report.data.get("text")), SiteEvent.NOTICE)
             elif report.kind is ReportKind.ROLLED:
                 run = Path(_text(report.data.get("run"))).name
                 self.run = self._folder / run
-                self._tell(f"continues in run {run}", SiteEvent.ROLLED, run=run)
+                self._report_event(f"continues in run {run}", SiteEvent.ROLLED, run=run)
             elif report.kind in (ReportKind.ENDED, ReportKind.REFUSED):
                 process.end = report
 
-    def _limit(self, process: _Supervised, now: float) -> None:
+    def _enforce_limits(self, process: _Process, now: float) -> None:
         """End a process that is silent for too long or uses too much memory."""
         limits = self.camera.limits
-        if process.asked is not None:
-            self._close(process, now - process.asked)
+        if process.terminated_at is not None:
+            self._close(process, now - process.terminated_at)
             return
-        patience = self.camera.settings.patience_s if process.away else 0.0
-        most = limits.start_s if process.first_step is None else limits.silent_s + patience
+        extra_s = self.camera.settings.patience_s if process.source_lost else 0.0
+        max_silence_s = limits.start_s if process.first_step is None else limits.silent_s + extra_s
         memory = process.child.memory_mb()
-        if now - process.heard > most:
-            self._tell(
-                f"no sign of life for {now - process.heard:.0f} s: its process is killed",
+        if now - process.last_report > max_silence_s:
+            self._report_event(
+                f"no sign of life for {now - process.last_report:.0f} s: its process is killed",
                 SiteEvent.HUNG,
             )
             process.child.kill()
-            process.heard, process.killed = now, True
+            process.last_report, process.killed = now, True
         elif memory is not None and memory > limits.memory_mb:
-            self._tell(
+            self._report_event(
                 f"{memory:.0f} MB in use, {limits.memory_mb:.0f} allowed: its process is restarted",
                 SiteEvent.TOO_LARGE,
                 memory_mb=round(memory),
             )
-            self._ask(process, now)
+            self._terminate(process, now)
 
-    def _close(self, process: _Supervised, waited: float) -> None:
-        if waited > CLOSE_S and not process.killed:
-            process.killed = self.killed_at_close = True
-            self._tell(
-                f"its process did not close within {CLOSE_S:g} s and is killed",
+    def _close(self, process: _Process, waited_s: float) -> None:
+        if waited_s > KILL_AFTER_S and not process.killed:
+            process.killed = self.killed_on_close = True
+            self._report_event(
+                f"its process did not close within {KILL_AFTER_S:g} s and is killed",
                 SiteEvent.NOT_CLOSED,
             )
             process.child.kill()
-        elif waited > ASK_AGAIN_S and not process.asked_twice:
-            process.asked_twice = True
-            process.child.ask_to_end()
+        elif waited_s > TERMINATE_AGAIN_S and not process.terminated_twice:
+            process.terminated_twice = True
+            process.child.terminate()
 
-    def _ask(self, process: _Supervised, now: float) -> None:
-        if process.asked is None:
-            process.asked = now
-            process.child.ask_to_end()
+    def _terminate(self, process: _Process, now: float) -> None:
+        if process.terminated_at is None:
+            process.terminated_at = now
+            process.child.terminate()
         self.state = CameraState.CLOSING
 
-    def _ended(self, process: _Supervised, code: int, now: float) -> None:
-        self._listen(process, now)  # reports sent before it ended
+    def _process_ended(self, process: _Process, code: int, now: float) -> None:
+        self._read_reports(process, now)  # reports sent before it ended
         process.child.close()
         self.figures.process_ended()
         self._process = None
-        asked = process.asked is not None
-        if self._next_camera is None or (not asked and self._source_ended(process)):
+        terminated_at = process.terminated_at is not None
+        if self._next_camera is None or (not terminated_at and self._source_ended(process)):
             self.state = CameraState.OVER
-            words = _outcome(
+            text = _end_text(
                 process, "it is no longer watched" if self._next_camera is None else ""
             )
-            self._tell(words, SiteEvent.ENDED)
+            self._report_event(text, SiteEvent.ENDED)
             return
         self.state = CameraState.WAITING
-        if asked:
-            self._tell(_outcome(process, "it is restarted"), SiteEvent.ENDED)
+        if terminated_at:
+            self._report_event(_end_text(process, "it is restarted"), SiteEvent.ENDED)
             return
         self._count(process, now)
-        self._due = now + self._backoff.wait_s
+        self._start_at = now + self._backoff.wait_s
         self.restarts += 1
-        why = _outcome(process, "") if process.end else _death(code, killed=process.killed)
-        again = f"{why}; restarting in {self._backoff.wait_s:g} s"
-        self._tell(again, SiteEvent.DIED, exit_code=code, wait_s=self._backoff.wait_s)
+        cause = _end_text(process, "") if process.end else _exit_text(code, killed=process.killed)
+        restart_text = f"{cause}; restarting in {self._backoff.wait_s:g} s"
+        self._report_event(
+            restart_text, SiteEvent.DIED, exit_code=code, wait_s=self._backoff.wait_s
+        )
 
-    def _count(self, process: _Supervised, now: float) -> None:
+    def _count(self, process: _Process, now: float) -> None:
         """Update the backoff and the count of failed attempts to resume after an end."""
-        ran = 0.0 if process.first_step is None else now - process.first_step
-        self._backoff = self._backoff.after(ran)
+        ran_s = 0.0 if process.first_step is None else now - process.first_step
+        self._backoff = self._backoff.after(ran_s)
         if not process.resumed or process.first_step is not None:
             self._failed_resumes = 0
         elif process.end and process.end.kind is ReportKind.REFUSED:
@@ -309,13 +313,13 @@ class CameraSupervisor:
         else:
             self._failed_resumes += 1
 
-    def _source_ended(self, process: _Supervised) -> bool:
+    def _source_ended(self, process: _Process) -> bool:
         """Whether the source is a file that was played to its end."""
         end = process.end
         return bool(end and end.kind is ReportKind.ENDED and end.data.get("live") is False)
 
 
-def _outcome(process: _Supervised, consequence: str) -> str:
+def _end_text(process: _Process, consequence: str) -> str:
     end = process.end
     if end is None:
         return consequence or "it is over"
@@ -329,7 +333,7 @@ def _outcome(process: _Supervised, consequence: str) -> str:
     return f"{text}; {consequence}" if consequence else text
 
 
-def _death(code: int, *, killed: bool) -> str:
+def _exit_text(code: int, *, killed: bool) -> str:
     if killed:
         return "its process was killed"
     return (

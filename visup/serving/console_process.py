@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from visup.serving.backoff import Backoff
 from visup.serving.site.records import SiteConsole
-from visup.serving.site_log import SITE, SiteEvent, Tell
+from visup.serving.site_log import SITE, LogEvent, SiteEvent
 
 if TYPE_CHECKING:
     from visup.serving.site_supervisor import SiteSupervisor
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 CLOSING_S = 2.0
 """How long the process may take to end when asked to, seconds."""
 
-Begin = Callable[[Sequence[str], Mapping[str, str]], "subprocess.Popen[bytes]"]
+StartProcess = Callable[[Sequence[str], Mapping[str, str]], "subprocess.Popen[bytes]"]
 
 
 def console_command(console: SiteConsole, store: Path) -> Sequence[str]:
@@ -44,7 +44,7 @@ def console_environment(console: SiteConsole) -> Mapping[str, str]:
     return {name: token for name, token in variables.items() if token is not None}
 
 
-def begun(command: Sequence[str], tokens: Mapping[str, str]) -> subprocess.Popen[bytes]:
+def start_process(command: Sequence[str], tokens: Mapping[str, str]) -> subprocess.Popen[bytes]:
     """Start the process; it ends when its standard input closes, however the service ends.
 
     Its standard output is discarded: the address printed for people who start it by hand contains the token.
@@ -67,21 +67,23 @@ class ConsoleProcess:
         begin: Starts the process.
     """
 
-    def __init__(self, store: Path, tell: Tell, begin: Begin = begun) -> None:
-        self._store, self._tell, self._begin = store, tell, begin
+    def __init__(
+        self, store: Path, log_event: LogEvent, start: StartProcess = start_process
+    ) -> None:
+        self._store, self._log_event, self._start_process = store, log_event, start
         self._process: subprocess.Popen[bytes] | None = None
-        self._wanted: SiteConsole | None = None
-        self._backoff, self._begun_at, self._due = Backoff(), 0.0, 0.0
+        self._console: SiteConsole | None = None
+        self._backoff, self._started_at, self._start_at = Backoff(), 0.0, 0.0
 
-    def turn(self, supervisor: SiteSupervisor, now: float) -> None:
+    def tick(self, supervisor: SiteSupervisor, now: float) -> None:
         """Start, restart or end the console as needed; waits for nothing but its end."""
-        if self._wanted != supervisor.console:
+        if self._console != supervisor.console:
             self.close()
-            self._wanted, self._backoff, self._due = supervisor.console, Backoff(), now
+            self._console, self._backoff, self._start_at = supervisor.console, Backoff(), now
         if self._process is not None and (code := self._process.poll()) is not None:
             self._ended(code, now)
-        if self._wanted is not None and self._process is None and now >= self._due:
-            self._start(self._wanted, now)
+        if self._console is not None and self._process is None and now >= self._start_at:
+            self._start(self._console, now)
 
     def close(self) -> None:
         """End the console."""
@@ -94,13 +96,13 @@ class ConsoleProcess:
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
-        _free(process)
+        _close_stdin(process)
 
     def _start(self, console: SiteConsole, now: float) -> None:
         host, port = console.listen
         address = f"http://{f'[{host}]' if ':' in host else host}:{port}/"
         try:
-            self._process = self._begin(
+            self._process = self._start_process(
                 console_command(console, self._store), console_environment(console)
             )
         except OSError as fault:
@@ -108,25 +110,25 @@ class ConsoleProcess:
                 f"the console cannot be started ({fault.strerror or fault})", 0.0, now
             )
             return
-        self._begun_at = now
-        self._tell(SITE, f"the console is at {address}", SiteEvent.CONSOLE, address=address)
+        self._started_at = now
+        self._log_event(SITE, f"the console is at {address}", SiteEvent.CONSOLE, address=address)
 
     def _ended(self, code: int, now: float) -> None:
         process, self._process = self._process, None
         if process is not None:
-            _free(process)
+            _close_stdin(process)
         how = f"signal {-code}" if code < 0 else f"exit code {code}"
-        self._schedule_restart(f"the console ended ({how})", now - self._begun_at, now)
+        self._schedule_restart(f"the console ended ({how})", now - self._started_at, now)
 
     def _schedule_restart(self, what: str, ran_s: float, now: float) -> None:
         self._backoff = self._backoff.after(ran_s)
         wait = self._backoff.wait_s
-        self._due = now + wait
+        self._start_at = now + wait
         text = f"{what}; restarting in {wait:g} s"
-        self._tell(SITE, text, SiteEvent.CONSOLE_ENDED, wait_s=wait)
+        self._log_event(SITE, text, SiteEvent.CONSOLE_ENDED, wait_s=wait)
 
 
-def _free(process: subprocess.Popen[bytes]) -> None:
+def _close_stdin(process: subprocess.Popen[bytes]) -> None:
     if process.stdin:
         with suppress(OSError):
             process.stdin.close()

@@ -15,7 +15,7 @@ from pydantic import TypeAdapter
 from visup.agent.storage.jsonable import to_jsonable
 from visup.runs.settings import RunOptions, WatchSettings
 
-LONGEST_LINE = 4000
+MAX_LINE_BYTES = 4000
 """Bytes of a report: writes of less than a page (4096 bytes) to a pipe are atomic."""
 
 
@@ -84,9 +84,9 @@ def report_line(report: CameraReport) -> bytes:
     """A report as one line; overlong texts are cut."""
     fields = {"kind": report.kind.value, **report.data}
     line = json.dumps(fields).encode()
-    if len(line) > LONGEST_LINE:
-        longest = LONGEST_LINE // (12 * max(1, len(fields)))
-        fields = {k: v[:longest] if isinstance(v, str | list) else v for k, v in fields.items()}
+    if len(line) > MAX_LINE_BYTES:
+        max_length = MAX_LINE_BYTES // (12 * max(1, len(fields)))
+        fields = {k: v[:max_length] if isinstance(v, str | list) else v for k, v in fields.items()}
         line = json.dumps({k: v for k, v in fields.items() if not isinstance(v, list)}).encode()
     return line + b"\n"
 

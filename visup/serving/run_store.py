@@ -33,16 +33,16 @@ class RunStore:
     folder: Path
     fingerprint: str
 
-    def place(self) -> Path:
+    def next_folder(self) -> Path:
         """A folder for a further run."""
-        return free_place(self.folder)
+        return free_run_folder(self.folder)
 
-    def go_on_with(self, run: Path) -> None:
+    def set_current(self, run: Path) -> None:
         """Make this the run that the next process resumes."""
-        note_run(run, self.fingerprint)
+        set_current_run(run, self.fingerprint)
 
 
-def run_under_way(folder: Path, fingerprint: str) -> Path | None:
+def resumable_run(folder: Path, fingerprint: str) -> Path | None:
     """The run of a camera that can be resumed, or None.
 
     Args:
@@ -50,12 +50,12 @@ def run_under_way(folder: Path, fingerprint: str) -> Path | None:
         fingerprint: Fingerprint of the camera's present settings; a run resumes only under its own.
     """
     try:
-        note = json.loads(read_text_file(folder / CURRENT))
-        name, noted_fingerprint = str(note["run"]), str(note["fingerprint"])
+        current = json.loads(read_text_file(folder / CURRENT))
+        name, current_fingerprint = str(current["run"]), str(current["fingerprint"])
     except (OSError, ValueError, KeyError, TypeError):
         return None
     run = folder / name
-    if noted_fingerprint != fingerprint or Path(name).name != name:
+    if current_fingerprint != fingerprint or Path(name).name != name:
         return None
     try:
         return None if Recording.open(run).facts().get("ended") in _OVER else run
@@ -74,8 +74,8 @@ def begin_run(folder: Path, fingerprint: str, now: datetime | None = None) -> Pa
     Raises:
         OutputError: The folder cannot be written.
     """
-    run = free_place(folder, now)
-    note_run(run, fingerprint)
+    run = free_run_folder(folder, now)
+    set_current_run(run, fingerprint)
     return run
 
 
@@ -88,7 +88,7 @@ def is_run_name(name: str) -> bool:
     return bool(_RUN.fullmatch(name))
 
 
-def free_place(folder: Path, now: datetime | None = None) -> Path:
+def free_run_folder(folder: Path, now: datetime | None = None) -> Path:
     """A folder for a new run, named for the time in UTC; it is not yet created.
 
     Args:
@@ -107,15 +107,15 @@ def free_place(folder: Path, now: datetime | None = None) -> Path:
         raise _unwritable(folder, fault) from fault
 
 
-def note_run(run: Path, fingerprint: str) -> None:
+def set_current_run(run: Path, fingerprint: str) -> None:
     """Note that this is the run to resume.
 
     Raises:
         OutputError: The folder cannot be written.
     """
-    note = json.dumps({"run": run.name, "fingerprint": fingerprint}, indent=1)
+    current = json.dumps({"run": run.name, "fingerprint": fingerprint}, indent=1)
     try:
-        write_atomically(run.parent / CURRENT, note.encode() + b"\n")
+        write_atomically(run.parent / CURRENT, current.encode() + b"\n")
     except OSError as fault:
         raise _unwritable(run.parent, fault) from fault
 

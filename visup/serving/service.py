@@ -10,9 +10,9 @@ from visup.runs.inputs.stop_signals import StopRequest
 from visup.runs.result import ExitCode
 from visup.serving.console_process import ConsoleProcess
 from visup.serving.monitoring.endpoint import MonitoringServer
-from visup.serving.room.housekeeper import Housekeeper
+from visup.serving.retention.housekeeper import Housekeeper
 from visup.serving.site.records import Site
-from visup.serving.site_log import SITE, SiteEvent, Tell
+from visup.serving.site_log import SITE, LogEvent, SiteEvent
 from visup.serving.site_supervisor import SiteSupervisor, serve_site
 from visup.serving.spare_process import SpareProcess
 
@@ -20,12 +20,12 @@ UPDATE_S = 1.0
 """Seconds between updates of the monitoring status."""
 
 
-def serve(site: Site, tell: Tell, stop: StopRequest) -> ExitCode:
+def serve(site: Site, log_event: LogEvent, stop: StopRequest) -> ExitCode:
     """Watch a site until a stop is requested or every source has ended; see `serve_site`.
 
     Args:
         site: The site.
-        tell: Receives the events.
+        log_event: Receives the events.
         stop: Stop and reload requests by signals.
 
     Raises:
@@ -34,26 +34,26 @@ def serve(site: Site, tell: Tell, stop: StopRequest) -> ExitCode:
     with ExitStack() as stack:
         spare = SpareProcess()
         stack.callback(spare.close)
-        monitor = MonitoringFeed(site, tell)
+        monitor = MonitoringFeed(site, log_event)
         stack.callback(monitor.close)
-        console = ConsoleProcess(site.store, tell)
+        console = ConsoleProcess(site.store, log_event)
         stack.callback(console.close)
-        keeper = Housekeeper(site.store, site.retention, tell)
+        housekeeper = Housekeeper(site.store, site.retention, log_event)
 
         def apply_retention(supervisor: SiteSupervisor, now: float) -> None:
-            keeper.limits = supervisor.limits
-            keeper.turn(now, supervisor.going_on)
+            housekeeper.limits = supervisor.limits
+            housekeeper.tick(now, supervisor.active_runs)
 
         def update_monitoring(supervisor: SiteSupervisor, now: float) -> None:
-            monitor.turn(supervisor, now, keeper)
+            monitor.tick(supervisor, now, housekeeper)
 
         background = (
             apply_retention,
             update_monitoring,
-            console.turn,
-            *((spare.turn,) if site.spare else ()),
+            console.tick,
+            *((spare.tick,) if site.spare else ()),
         )
-        return serve_site(site, tell, stop, spare.start, beside=background)
+        return serve_site(site, log_event, stop, spare.start, background_tasks=background)
 
 
 class MonitoringFeed:
@@ -64,7 +64,7 @@ class MonitoringFeed:
         tell: Receives the address or the fault.
     """
 
-    def __init__(self, site: Site, tell: Tell) -> None:
+    def __init__(self, site: Site, log_event: LogEvent) -> None:
         self._server: MonitoringServer | None = None
         self._updated_at = -UPDATE_S
         if site.listen is None:
@@ -72,17 +72,19 @@ class MonitoringFeed:
         try:
             self._server = MonitoringServer(*site.listen)
         except OutputError as fault:
-            tell(SITE, str(fault), SiteEvent.NOT_MONITORED)
+            log_event(SITE, str(fault), SiteEvent.NOT_MONITORED)
             return
-        at = f"http://{self._server.address}/metrics"
-        tell(SITE, f"health and metrics are at {at}", SiteEvent.MONITORED, address=at)
+        url = f"http://{self._server.address}/metrics"
+        log_event(SITE, f"health and metrics are at {url}", SiteEvent.MONITORED, address=url)
 
-    def turn(self, supervisor: SiteSupervisor, now: float, keeper: Housekeeper) -> None:
+    def tick(self, supervisor: SiteSupervisor, now: float, housekeeper: Housekeeper) -> None:
         """Update the status at intervals."""
         if self._server and now - self._updated_at >= UPDATE_S:
             self._updated_at = now
             status = supervisor.status(now)
-            self._server.status = replace(status, room=keeper.room, deleted=dict(keeper.deleted))
+            self._server.status = replace(
+                status, disk_usage=housekeeper.disk_usage, deleted=dict(housekeeper.deleted)
+            )
 
     def close(self) -> None:
         """Stop listening."""

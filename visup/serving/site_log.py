@@ -55,7 +55,7 @@ _WARNINGS = frozenset(
 )
 
 
-class Tell(Protocol):
+class LogEvent(Protocol):
     """Receives the events of the service."""
 
     def __call__(

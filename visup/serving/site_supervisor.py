@@ -20,9 +20,9 @@ from visup.serving.reports import CameraJob
 from visup.serving.service_manager import notify_manager
 from visup.serving.site.reading import read_site
 from visup.serving.site.records import RetentionLimits, Site, SiteConsole
-from visup.serving.site_log import SITE, SiteEvent, Tell
+from visup.serving.site_log import SITE, LogEvent, SiteEvent
 
-TURN_S = 0.1
+TICK_S = 0.1
 """Seconds between two turns of all supervisors."""
 
 
@@ -39,19 +39,19 @@ class SiteSupervisor:
     """
 
     def __init__(
-        self, site: Site, tell: Tell, start: Callable[[CameraJob], Child] = CameraChild
+        self, site: Site, log_event: LogEvent, start: Callable[[CameraJob], Child] = CameraChild
     ) -> None:
-        self._site, self._tell, self._start = site, tell, start
+        self._site, self._log_event, self._start = site, log_event, start
         self.cameras = {c.name: self._supervisor(c.name, site) for c in site.cameras}
-        self._left: list[CameraSupervisor] = []
-        self._killed_at_close = False
+        self._removed: list[CameraSupervisor] = []
+        self._killed_on_close = False
 
-    def turn(self, now: float) -> None:
+    def tick(self, now: float) -> None:
         """Do what is due for every camera."""
-        for one in (*self.cameras.values(), *self._left):
-            one.turn(now)
-        self._killed_at_close |= any(one.killed_at_close for one in self._left)
-        self._left = [one for one in self._left if one.state is not CameraState.OVER]
+        for camera in (*self.cameras.values(), *self._removed):
+            camera.tick(now)
+        self._killed_on_close |= any(camera.killed_on_close for camera in self._removed)
+        self._removed = [camera for camera in self._removed if camera.state is not CameraState.OVER]
 
     def reload(self, site: Site, now: float) -> None:
         """Apply a changed site file; cameras that did not change are not touched.
@@ -60,12 +60,12 @@ class SiteSupervisor:
         """
         if site.store != self._site.store:
             text = "another store is used after a restart of the service"
-            self._tell(SITE, text, SiteEvent.NOT_RELOADED)
+            self._log_event(SITE, text, SiteEvent.NOT_RELOADED)
         cameras = {c.name: c for c in site.cameras}
         for name in [n for n in self.cameras if n not in cameras]:
-            gone = self.cameras.pop(name)
-            gone.stop(now)
-            self._left.append(gone)
+            removed = self.cameras.pop(name)
+            removed.stop(now)
+            self._removed.append(removed)
         for name, camera in cameras.items():
             if name not in self.cameras:
                 self.cameras[name] = self._supervisor(name, site)
@@ -83,9 +83,9 @@ class SiteSupervisor:
         return SiteStatus(now, tuple(one.status(now) for one in self.cameras.values()))
 
     @property
-    def going_on(self) -> tuple[Path, ...]:
+    def active_runs(self) -> tuple[Path, ...]:
         """Folders of the runs that are active or will be resumed."""
-        supervisors = (*self.cameras.values(), *self._left)
+        supervisors = (*self.cameras.values(), *self._removed)
         return tuple(one.run for one in supervisors if one.run)
 
     @property
@@ -99,56 +99,60 @@ class SiteSupervisor:
         return self._site.console
 
     @property
-    def calm(self) -> bool:
+    def stable(self) -> bool:
         """Whether no camera is starting or closing."""
-        return all(one.state in _CALM_STATES for one in self.cameras.values())
+        return all(one.state in _STABLE_STATES for one in self.cameras.values())
 
     @property
     def over(self) -> bool:
         """Whether no process is left and none will be started."""
-        supervisors = (*self.cameras.values(), *self._left)
+        supervisors = (*self.cameras.values(), *self._removed)
         return all(one.state is CameraState.OVER for one in supervisors)
 
     @property
-    def closed_well(self) -> bool:
+    def closed_cleanly(self) -> bool:
         """Whether no process had to be killed when it was asked to end."""
-        return not (self._killed_at_close or any(o.killed_at_close for o in self.cameras.values()))
+        return not (self._killed_on_close or any(o.killed_on_close for o in self.cameras.values()))
 
     def _supervisor(self, name: str, site: Site) -> CameraSupervisor:
         (camera,) = (c for c in site.cameras if c.name == name)
         store = self._site.store  # the store does not change during the life of a service
-        return CameraSupervisor(camera, store, self._tell, _sharing(self._start, len(site.cameras)))
+        return CameraSupervisor(
+            camera, store, self._log_event, _with_thread_share(self._start, len(site.cameras))
+        )
 
 
-def _sharing(start: Callable[[CameraJob], Child], cameras: int) -> Callable[[CameraJob], Child]:
+def _with_thread_share(
+    start: Callable[[CameraJob], Child], cameras: int
+) -> Callable[[CameraJob], Child]:
     """Start cameras with an equal share of the cores each: more threads than cores only cost time."""
     threads = max(1, (os.cpu_count() or 1) // cameras)
     return lambda job: start(replace(job, threads=threads))
 
 
-_CALM_STATES = (CameraState.WATCHING, CameraState.OVER)
+_STABLE_STATES = (CameraState.WATCHING, CameraState.OVER)
 
-Beside = Callable[[SiteSupervisor, float], None]
+BackgroundTask = Callable[[SiteSupervisor, float], None]
 """Called at every turn with the time; it must not block, and limits its own rate."""
 
 
 def serve_site(
     site: Site,
-    tell: Tell,
+    log_event: LogEvent,
     stop: StopRequest,
     start: Callable[[CameraJob], Child] = CameraChild,
     clock: WaitingClock | None = None,
-    beside: Sequence[Beside] = (),
+    background_tasks: Sequence[BackgroundTask] = (),
 ) -> ExitCode:
     """Watch a site until a stop is requested or every source has ended.
 
     Args:
         site: The site.
-        tell: Receives the events.
+        log_event: Receives the events.
         stop: Stop and reload requests by signals; a reload reads the site file again.
         start: Starts a process.
         clock: Clock of the service.
-        beside: Further tasks of every turn.
+        background_tasks: Further tasks of every turn.
 
     Returns:
         `GOOD`, or `NOT_RECORDED` when a process had to be killed as it did not close in time.
@@ -158,8 +162,8 @@ def serve_site(
     """
     clock = clock or WaitingClock()
     with _only_service(site.store):
-        supervisor = SiteSupervisor(site, tell, start)
-        supervisor.turn(clock.now())
+        supervisor = SiteSupervisor(site, log_event, start)
+        supervisor.tick(clock.now())
         notify_manager("READY=1")
         stopping = False
         while not supervisor.over:
@@ -169,23 +173,23 @@ def serve_site(
                 supervisor.stop(clock.now())
             if stop.reload and not stopping:
                 stop.reload = False
-                _reload(supervisor, site.path, tell, clock.now())
-            supervisor.turn(clock.now())
-            for act in beside:
-                act(supervisor, clock.now())
+                _reload(supervisor, site.path, log_event, clock.now())
+            supervisor.tick(clock.now())
+            for task in background_tasks:
+                task(supervisor, clock.now())
             notify_manager("WATCHDOG=1")
-            clock.wait(TURN_S)
-    return ExitCode.GOOD if supervisor.closed_well else ExitCode.NOT_RECORDED
+            clock.wait(TICK_S)
+    return ExitCode.GOOD if supervisor.closed_cleanly else ExitCode.NOT_RECORDED
 
 
-def _reload(supervisor: SiteSupervisor, path: Path, tell: Tell, now: float) -> None:
+def _reload(supervisor: SiteSupervisor, path: Path, log_event: LogEvent, now: float) -> None:
     try:
         site = read_site(path)
     except VisupError as fault:
         text = f"the site file has mistakes, nothing was changed: {fault}"
-        tell(SITE, text, SiteEvent.NOT_RELOADED)
+        log_event(SITE, text, SiteEvent.NOT_RELOADED)
         return
-    tell(SITE, "the site file was reloaded", SiteEvent.RELOADED)
+    log_event(SITE, "the site file was reloaded", SiteEvent.RELOADED)
     supervisor.reload(site, now)
 
 

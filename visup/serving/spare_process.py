@@ -17,7 +17,7 @@ from visup.serving.reports import CameraJob
 if TYPE_CHECKING:
     from visup.serving.site_supervisor import SiteSupervisor
 
-PAUSE_S = 2.0
+SETTLE_S = 2.0
 """Seconds of calm before a spare process is started: cameras that have just restarted need the processor."""
 
 
@@ -28,10 +28,10 @@ class SpareProcess:
         begin: Starts a process, given its job or None.
     """
 
-    def __init__(self, begin: Callable[[CameraJob | None], CameraChild] = CameraChild) -> None:
-        self._begin = begin
+    def __init__(self, start: Callable[[CameraJob | None], CameraChild] = CameraChild) -> None:
+        self._start_process = start
         self._spare: CameraChild | None = None
-        self._begun_at = 0.0
+        self._started_at = 0.0
         self._due: float | None = None
         self._backoff = Backoff()
 
@@ -41,24 +41,24 @@ class SpareProcess:
         if spare is None or spare.exit_code() is not None:
             if spare:
                 spare.close()
-            return self._begin(job)
-        spare.give(job)
+            return self._start_process(job)
+        spare.send_job(job)
         return spare
 
-    def turn(self, supervisor: SiteSupervisor, now: float) -> None:
+    def tick(self, supervisor: SiteSupervisor, now: float) -> None:
         """Start a spare process once all cameras are calm."""
         if self._spare and self._spare.exit_code() is not None:
             self._spare.close()
-            self._spare, self._backoff = None, self._backoff.after(now - self._begun_at)
+            self._spare, self._backoff = None, self._backoff.after(now - self._started_at)
             self._due = now + self._backoff.wait_s
-        if self._spare or supervisor.over or not supervisor.calm:
+        if self._spare or supervisor.over or not supervisor.stable:
             return
         if self._due is None:
-            self._due = now + PAUSE_S
+            self._due = now + SETTLE_S
         elif now >= self._due:
-            self._due, self._begun_at = None, now
+            self._due, self._started_at = None, now
             with suppress(OSError):  # tried again; cameras restart without a spare meanwhile
-                self._spare = self._begin(None)
+                self._spare = self._start_process(None)
 
     def close(self) -> None:
         """End the spare process."""

@@ -22,7 +22,7 @@ from visup.runs.wiring import build_agent, open_video
 
 FRAMES = 12
 """Frames of the shipped clip, enough for something to move, be tracked and be recognised."""
-PANNED_FRAMES, PANNED_PX = 12, 4
+PAN_FRAMES, PAN_PX = 12, 4
 """Frames of it as seen by a camera that pans, and pixels between two of them."""
 
 
@@ -50,9 +50,9 @@ def warm_up_moving_camera() -> None:
     """Segment some frames of the shipped clip, each seen a little further to the right."""
     segmenter = MotionSegmenter()
     with suppress(VisupError), open_video(demo_settings()) as video:
-        for number, frame in enumerate(islice(video, PANNED_FRAMES)):
-            left = number * PANNED_PX
-            right = frame.image.shape[1] - (PANNED_FRAMES - number) * PANNED_PX
+        for number, frame in enumerate(islice(video, PAN_FRAMES)):
+            left = number * PAN_PX
+            right = frame.image.shape[1] - (PAN_FRAMES - number) * PAN_PX
             segmenter.step(replace(frame, image=np.ascontiguousarray(frame.image[:, left:right])))
 
 

@@ -1,6 +1,6 @@
 """Sinks: alerts and metrics for other programs, outside the cycle.
 
-Read `outbox.py` (asynchronous delivery), `insistent_outbox.py` with `delivery_log.py` (reliable delivery for
+Read `outbox.py` (asynchronous delivery), `durable_outbox.py` with `delivery_log.py` (reliable delivery for
 services), then `lines.py` (files), `webhook.py`, and `registry.py` (parses `--sink`).
 """
 

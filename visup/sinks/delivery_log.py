@@ -29,16 +29,16 @@ CREATE TABLE IF NOT EXISTS noted (number INTEGER PRIMARY KEY AUTOINCREMENT, deli
 CREATE TABLE IF NOT EXISTS reserve (filling BLOB);
 DELETE FROM reserve;
 """
-RESERVE_BYTES, LOG_BYTES = 2**20, 2**19
+RESERVE_BYTES, ROLLBACK_LOG_BYTES = 2**20, 2**19
 """Reserved for a full disk: pages for some hundred records, and the log of one transaction."""
 
-MOST_NOTED = 4000
+MAX_REMEMBERED = 4000
 """Maximum number of remembered alerts: far more than open between two checkpoints."""
 
 SYNCHRONOUS = "FULL"
 """Records are on disk before they are sent, even if the power fails; tests relax this."""
 
-MOST_WAITING = 10_000
+MAX_WAITING = 10_000
 """Maximum records per sink; beyond it the oldest are lost."""
 
 DELIVERY = "delivery"
@@ -63,7 +63,7 @@ class DeliveryLog:
             self._db.execute("PRAGMA journal_mode=PERSIST")
             self._db.execute(f"PRAGMA synchronous={SYNCHRONOUS}")
             self._db.executescript(SCHEMA)
-            self._name_course(anew=False)
+            self._load_sequence_id(new=False)
         except sqlite3.Error as fault:
             raise OutputError(
                 f"the queue of undelivered alerts cannot be kept ({fault})",
@@ -75,10 +75,10 @@ class DeliveryLog:
         )
         self._reserve.keep(self._db)
         with suppress(OSError):
-            preallocate(path.with_name(f"{path.name}-journal"), LOG_BYTES)
+            preallocate(path.with_name(f"{path.name}-journal"), ROLLBACK_LOG_BYTES)
 
     @property
-    def told_frame(self) -> int:
+    def last_frame(self) -> int:
         """Number of the last frame whose alerts were stored; -1 before the first."""
         with self._lock:
             row = self._db.execute("SELECT frame_index FROM told").fetchone()
@@ -88,14 +88,14 @@ class DeliveryLog:
         """Begin a new run, with frames and alerts counted from 0; waiting records stay."""
         with self._lock:
             self._db.execute("DELETE FROM told")
-            self._name_course(anew=True)
+            self._load_sequence_id(new=True)
 
     def labelled(self, record: Mapping[str, Any]) -> dict[str, Any]:
         """A record with its delivery id, which for an alert does not depend on the process."""
         if record.get("record") != "alert":
             return {**record, DELIVERY: uuid.uuid4().hex}
-        told = f"{record['id']} {record['opened']!r} {record['state']}"
-        return {**record, DELIVERY: uuid.uuid5(self._course, told).hex}
+        key = f"{record['id']} {record['opened']!r} {record['state']}"
+        return {**record, DELIVERY: uuid.uuid5(self._sequence_id, key).hex}
 
     def add(
         self,
@@ -126,7 +126,7 @@ class DeliveryLog:
                 self._db.executemany("INSERT INTO waiting (sink, record) VALUES (?, ?)", rows)
                 if frame_index is not None:
                     self._db.execute("INSERT OR REPLACE INTO told VALUES (0, ?)", (frame_index,))
-                lost = sum(self._shorten(sink) for sink in sinks)
+                lost = sum(self._drop_oldest(sink) for sink in sinks)
                 self._db.execute("COMMIT")
             except sqlite3.Error:
                 if self._db.in_transaction:
@@ -157,13 +157,13 @@ class DeliveryLog:
         with self._lock:
             self._db.close()
 
-    def _name_course(self, *, anew: bool) -> None:
+    def _load_sequence_id(self, *, new: bool) -> None:
         """Load or draw the id of a sequence of runs, whose alerts are numbered together."""
         found = self._db.execute("SELECT name FROM course").fetchone()
-        if anew or not found:
+        if new or not found:
             found = (uuid.uuid4().hex,)
             self._db.execute("INSERT OR REPLACE INTO course VALUES (0, ?)", found)
-        self._course = uuid.UUID(found[0])
+        self._sequence_id = uuid.UUID(found[0])
 
     def _is_new(self, record: Mapping[str, Any]) -> bool:
         """Store the id of an alert; False if it was stored before, perhaps by an earlier process."""
@@ -172,13 +172,13 @@ class DeliveryLog:
         sql = "INSERT OR IGNORE INTO noted (delivery) VALUES (?)"
         added = self._db.execute(sql, (record[DELIVERY],))
         if added.rowcount:
-            old = "DELETE FROM noted WHERE number <= ?"
-            self._db.execute(old, ((added.lastrowid or 0) - MOST_NOTED,))
+            delete = "DELETE FROM noted WHERE number <= ?"
+            self._db.execute(delete, ((added.lastrowid or 0) - MAX_REMEMBERED,))
         return bool(added.rowcount)
 
-    def _shorten(self, sink: str) -> int:
+    def _drop_oldest(self, sink: str) -> int:
         sql = (
             "DELETE FROM waiting WHERE number IN (SELECT number FROM waiting WHERE sink = ? "
             "ORDER BY number DESC LIMIT -1 OFFSET ?)"
         )
-        return self._db.execute(sql, (sink, MOST_WAITING)).rowcount
+        return self._db.execute(sql, (sink, MAX_WAITING)).rowcount

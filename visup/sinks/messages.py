@@ -12,7 +12,7 @@ from visup.agent.storage.jsonable import to_jsonable
 from visup.agent.storage.wall_clock import RecordStamp
 from visup.redaction import redacted
 from visup.sinks.delivery_log import DeliveryLog
-from visup.sinks.insistent_outbox import InsistentOutbox
+from visup.sinks.durable_outbox import DurableOutbox
 from visup.sinks.outbox import Outbox
 
 VERSION = 1
@@ -32,12 +32,12 @@ def alert_record(alert: Alert, source: str) -> dict[str, Any]:
 
 def verdict_record(verdict: Verdict | None, steps: int, source: str) -> dict[str, Any]:
     """The record of the end of a run."""
-    told = verdict.value if verdict else None
+    verdict_text = verdict.value if verdict else None
     return {
         "version": VERSION,
         "record": "verdict",
         "source": source,
-        "verdict": told,
+        "verdict": verdict_text,
         "steps": steps,
     }
 
@@ -58,7 +58,7 @@ class AlertSender:
 
     def __init__(
         self,
-        outboxes: Sequence[Outbox | InsistentOutbox],
+        outboxes: Sequence[Outbox | DurableOutbox],
         source: str,
         stamp: RecordStamp | None = None,
         log: DeliveryLog | None = None,
@@ -75,16 +75,16 @@ class AlertSender:
         if records or step.alerts:
             self._send(records, step.frame_index)
 
-    def late(self, step: Step) -> None:
+    def send_missed(self, step: Step) -> None:
         """Send the records of a step that an earlier process recorded but did not send."""
-        if self._log and step.alerts and step.frame_index > self._log.told_frame:
+        if self._log and step.alerts and step.frame_index > self._log.last_frame:
             records = [self._record_of(alert) for alert in self.gate(step)]
             self._send(records, step.frame_index)
 
     def notice(self, text: str) -> None:
         """Send a sentence that cannot wait for a step."""
-        told = {"version": VERSION, "record": "notice", "source": self._source, "text": text}
-        self._send([{**told, **self._stamp.of(None)}])
+        record = {"version": VERSION, "record": "notice", "source": self._source, "text": text}
+        self._send([{**record, **self._stamp.of(None)}])
 
     def end(self, verdict: Verdict | None, steps: int) -> None:
         """Send the verdict."""
@@ -92,28 +92,28 @@ class AlertSender:
 
     def _record_of(self, alert: Alert) -> dict[str, Any]:
         when = alert.opened if alert.closed is None else alert.closed
-        told = {**alert_record(alert, self._source), **self.links(alert)}
-        return {**told, **self._stamp.of(when)}
+        record = {**alert_record(alert, self._source), **self.links(alert)}
+        return {**record, **self._stamp.of(when)}
 
     def _send(self, records: Sequence[dict[str, Any]], frame_index: int | None = None) -> None:
         if self._log:
             records = [self._log.labelled(record) for record in records]
-            if self._noted(self._log, records, frame_index):
+            if self._stored(self._log, records, frame_index):
                 return
         for outbox in self._outboxes:
             for record in records:
                 outbox.offer(record)
 
-    def _noted(
+    def _stored(
         self, log: DeliveryLog, records: Sequence[dict[str, Any]], frame_index: int | None
     ) -> bool:
         """Store records in the log; returns False if it cannot be written, and they are sent without it."""
-        insistent = [o for o in self._outboxes if isinstance(o, InsistentOutbox)]
+        durable = [o for o in self._outboxes if isinstance(o, DurableOutbox)]
         try:
-            lost = log.add([o.key for o in insistent], records, frame_index)
+            lost = log.add([o.key for o in durable], records, frame_index)
         except sqlite3.Error:
             return False
-        for outbox in insistent:
+        for outbox in durable:
             outbox.dropped += lost
             outbox.wake()
         return True

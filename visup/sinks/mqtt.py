@@ -9,7 +9,7 @@ from visup.agent.model.errors import ExtraMissingError, SettingsError
 from visup.sinks.lines import TIMEOUT_S, json_text
 
 PORT = 1883
-ONCE_AT_LEAST = 1
+QOS_AT_LEAST_ONCE = 1
 
 
 class Mqtt:
@@ -23,18 +23,18 @@ class Mqtt:
         ExtraMissingError: paho-mqtt is not installed.
     """
 
-    def __init__(self, place: str) -> None:
-        address, slash, topic = place.partition("/")
+    def __init__(self, target: str) -> None:
+        address, slash, topic = target.partition("/")
         host, _, port = address.partition(":")
         if not (host and slash and topic) or (port and not port.isdecimal()):
-            raise SettingsError(f"--sink mqtt:{place}", expected="mqtt:HOST[:PORT]/TOPIC")
+            raise SettingsError(f"--sink mqtt:{target}", expected="mqtt:HOST[:PORT]/TOPIC")
         try:
             from paho.mqtt import client
         except ModuleNotFoundError as missing:
             raise ExtraMissingError("a sink for MQTT", "mqtt") from missing
-        self.name = f"mqtt:{place}"
+        self.name = f"mqtt:{target}"
         self._topic = topic
-        self._place = host, int(port or PORT)
+        self._server = host, int(port or PORT)
         self._client = client.Client(client.CallbackAPIVersion.VERSION2)
         self._client.connect_timeout = TIMEOUT_S
         self._connected = False
@@ -46,12 +46,12 @@ class Mqtt:
             OSError, RuntimeError: The broker did not accept it.
         """
         if not self._connected:
-            self._client.connect(*self._place)
+            self._client.connect(*self._server)
             self._client.loop_start()
             self._connected = True
-        told = self._client.publish(self._topic, json_text(record), qos=ONCE_AT_LEAST)
-        told.wait_for_publish(TIMEOUT_S)
-        if not told.is_published():
+        message = self._client.publish(self._topic, json_text(record), qos=QOS_AT_LEAST_ONCE)
+        message.wait_for_publish(TIMEOUT_S)
+        if not message.is_published():
             raise TimeoutError("the broker did not answer")
 
     def close(self) -> None:

@@ -45,11 +45,11 @@ class Notification:
             DeliveryError: It was not accepted.
         """
         picture = record.get("snapshot")
-        there = isinstance(picture, str) and Path(picture).is_file()
-        taken = self._service.notify(
-            title=title_of(record), body=body_of(record), attach=picture if there else None
+        has_picture = isinstance(picture, str) and Path(picture).is_file()
+        accepted = self._service.notify(
+            title=title_of(record), body=body_of(record), attach=picture if has_picture else None
         )
-        if not taken:
+        if not accepted:
             raise DeliveryError("the message was not accepted")
 
     def close(self) -> None:
@@ -58,22 +58,22 @@ class Notification:
 
 def title_of(record: Mapping[str, Any]) -> str:
     """The title of a message: camera and severity."""
-    who = record.get("camera") or record.get("source", "visup")
+    sender = record.get("camera") or record.get("source", "visup")
     if record.get("record") == "alert":
         over = "over: " if record.get("state") == "closed" else ""
-        return f"{who}: {over}{record.get('severity', 'alert')}"
+        return f"{sender}: {over}{record.get('severity', 'alert')}"
     if record.get("record") == "verdict":
-        return f"{who}: the run has ended"
-    return f"{who}: notice"
+        return f"{sender}: the run has ended"
+    return f"{sender}: notice"
 
 
 def body_of(record: Mapping[str, Any]) -> str:
     """The body of a message: the sentence, its time, and links."""
     kind = record.get("record")
-    said = record.get("text") if kind == "notice" else record.get("cause")
+    sentence = record.get("text") if kind == "notice" else record.get("cause")
     if kind == "verdict":
-        said = f"Verdict: {record.get('verdict') or 'none'}, after {record.get('steps')} steps."
-    lines = [str(said)]
+        sentence = f"Verdict: {record.get('verdict') or 'none'}, after {record.get('steps')} steps."
+    lines = [str(sentence)]
     if "at" in record:
         lines.append(f"At {record['at']}.")
     for word, key in (("Picture", "snapshot"), ("Clip", "clip")):

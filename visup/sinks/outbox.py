@@ -14,7 +14,7 @@ from typing import Any, Protocol
 from visup.agent import AlertCondition, Severity
 from visup.agent.cycle.system_alerts import SINK_FAILED
 
-MOST_WAITING = 1000
+MAX_WAITING = 1000
 CLOSING_S = 5.0
 
 
@@ -47,14 +47,14 @@ class Outbox:
         fault: Why the last one was not delivered; empty if it was.
     """
 
-    def __init__(self, sink: Sink, most: int = MOST_WAITING) -> None:
+    def __init__(self, sink: Sink, max_length: int = MAX_WAITING) -> None:
         self.sink = sink
         self.delivered = self.dropped = self.failed = 0
         self.fault = ""
-        self._queue: Queue[Any] = Queue(most)
+        self._queue: Queue[Any] = Queue(max_length)
         self._closing = threading.Event()
-        self._given_up = threading.Event()
-        self._taken = 0
+        self._abandoned = threading.Event()
+        self._queued = 0
         self._thread = threading.Thread(target=self._run, name=f"sink {sink.name}", daemon=True)
         self._thread.start()
 
@@ -65,16 +65,16 @@ class Outbox:
         except Full:
             self.dropped += 1
         else:
-            self._taken += 1
+            self._queued += 1
 
     def close(self, wait_s: float = CLOSING_S) -> None:
         """Wait a last time for the queue to empty; remaining records are dropped."""
         self._closing.set()
         self._thread.join(wait_s)
-        if self._thread.is_alive() and not self._given_up.is_set():
+        if self._thread.is_alive() and not self._abandoned.is_set():
             # First stop the thread from taking more; the record in progress may or may not be delivered.
-            self._given_up.set()
-            self.dropped += self._taken - self.delivered - self.failed
+            self._abandoned.set()
+            self.dropped += self._queued - self.delivered - self.failed
             self.fault = self.fault or "it did not answer in time"
 
     @property
@@ -87,7 +87,7 @@ class Outbox:
         yield from sink_fault(self.sink.name, self.fault, self.dropped)
 
     def _run(self) -> None:
-        while not self._given_up.is_set():
+        while not self._abandoned.is_set():
             try:
                 record = self._queue.get(timeout=0.1)
             except Empty:

@@ -12,13 +12,13 @@ from visup.agent.model.step import Observer, Step
 from visup.agent.storage.wall_clock import RecordStamp
 from visup.redaction import redacted
 from visup.sinks.delivery_log import DeliveryLog
-from visup.sinks.insistent_outbox import InsistentOutbox
+from visup.sinks.durable_outbox import DurableOutbox
 from visup.sinks.lines import to_file, to_stdout
 from visup.sinks.messages import AlertSender
-from visup.sinks.outbox import CLOSING_S, MOST_WAITING, Outbox, Sink
+from visup.sinks.outbox import CLOSING_S, MAX_WAITING, Outbox, Sink
 from visup.sinks.webhook_access import WebhookAccess
 
-MOST_STEPS = 64
+MAX_STEPS = 64
 """Maximum number of whole steps with frames in a queue: some tens of megabytes."""
 
 KINDS = (
@@ -27,11 +27,11 @@ KINDS = (
 )
 
 
-def open_sink(wanted: str, access: WebhookAccess | None = None) -> Sink:
+def open_sink(spec: str, access: WebhookAccess | None = None) -> Sink:
     """Open a sink.
 
     Args:
-        wanted: `KIND:PLACE`, one of `KINDS`.
+        spec: `KIND:PLACE`, one of `KINDS`.
         access: Authentication of webhooks.
 
     Raises:
@@ -39,22 +39,22 @@ def open_sink(wanted: str, access: WebhookAccess | None = None) -> Sink:
         ExtraMissingError: It needs an extra that is not installed.
         OutputError: Its file cannot be written.
     """
-    kind, colon, place = wanted.partition(":")
-    if not (colon and place and kind in (*_MAKERS, "webhook")):
-        shown = f"{kind}{colon}{redacted(place)}"
+    kind, colon, target = spec.partition(":")
+    if not (colon and target and kind in (*_FACTORIES, "webhook")):
+        shown = f"{kind}{colon}{redacted(target)}"
         raise SettingsError(f"--sink {shown!r} cannot be read", expected=f"one of: {KINDS}")
     if kind == "webhook":
         from visup.sinks.webhook import Webhook
 
-        return Webhook(place, access=access)
-    return _MAKERS[kind](wanted, place)
+        return Webhook(target, access=access)
+    return _FACTORIES[kind](spec, target)
 
 
 class Sinks:
     """All sinks of a run, as one observer.
 
     Args:
-        wanted: As in `--sink`.
+        specs: As in `--sink`.
         source: The source.
         closing_s: Time limit for delivering remaining records at the end, seconds.
         stamp: Common fields of the records of alerts.
@@ -68,7 +68,7 @@ class Sinks:
 
     def __init__(
         self,
-        wanted: Sequence[str],
+        specs: Sequence[str],
         source: str,
         closing_s: float = CLOSING_S,
         stamp: RecordStamp | None = None,
@@ -76,12 +76,12 @@ class Sinks:
         log: DeliveryLog | None = None,
     ) -> None:
         self._closing_s, self._log = closing_s, log
-        made = [open_sink(w, access) for w in wanted]
-        self.outboxes = [_outbox(s, n, log) for n, s in enumerate(made)]
-        self._of_alerts = [o for o in self.outboxes if _kind(o) not in _OF_STEPS]
-        self.alerts = AlertSender(self._of_alerts, source, stamp, log)
+        opened = [open_sink(w, access) for w in specs]
+        self.outboxes = [_outbox(s, n, log) for n, s in enumerate(opened)]
+        self._alert_outboxes = [o for o in self.outboxes if _kind(o) not in _STEP_SINKS]
+        self.alerts = AlertSender(self._alert_outboxes, source, stamp, log)
         self._observers: list[Observer] = [
-            _sender(o, _OF_STEPS[_kind(o)]) for o in self.outboxes if _kind(o) in _OF_STEPS
+            _sender(o, _STEP_SINKS[_kind(o)]) for o in self.outboxes if _kind(o) in _STEP_SINKS
         ]
 
     def __call__(self, step: Step, frame: Frame) -> None:
@@ -96,7 +96,7 @@ class Sinks:
 
     def runtime_faults(self) -> Iterable[AlertCondition]:
         """Present faults of the sinks."""
-        return [concern for outbox in self.outboxes for concern in outbox.runtime_faults()]
+        return [condition for outbox in self.outboxes for condition in outbox.runtime_faults()]
 
     def end(self, verdict: Verdict | None, steps: int) -> tuple[str, ...]:
         """Send the verdict, close everything, and return notes about undelivered records."""
@@ -107,53 +107,53 @@ class Sinks:
     @property
     def delivered(self) -> bool:
         """Whether every alert sink accepted all records; sinks of whole steps may miss some."""
-        return not any(o.note for o in self._of_alerts)
+        return not any(o.note for o in self._alert_outboxes)
 
     def close(self) -> None:
         """Close all sinks; idempotent."""
-        insistent = [o for o in self.outboxes if isinstance(o, InsistentOutbox)]
-        for outbox in insistent:
-            outbox.begin_closing()  # start all together, to share the time limit
+        durable = [o for o in self.outboxes if isinstance(o, DurableOutbox)]
+        for pending in durable:
+            pending.start_closing()  # start all together, to share the time limit
         until = time.monotonic() + self._closing_s
-        for each in self.outboxes:
-            left = max(0.05, until - time.monotonic()) if each in insistent else self._closing_s
-            each.close(left)
+        for outbox in self.outboxes:
+            left = max(0.05, until - time.monotonic()) if outbox in durable else self._closing_s
+            outbox.close(left)
         if self._log:
             self._log.close()
             self._log = None
 
 
-def _jsonl(wanted: str, place: str) -> Sink:
-    if place != "-":
-        raise SettingsError(f"--sink {wanted!r} cannot be read", expected="jsonl:- or file:PATH")
+def _jsonl(spec: str, target: str) -> Sink:
+    if target != "-":
+        raise SettingsError(f"--sink {spec!r} cannot be read", expected="jsonl:- or file:PATH")
     return to_stdout()
 
 
-def _mqtt(wanted: str, place: str) -> Sink:
+def _mqtt(spec: str, target: str) -> Sink:
     from visup.sinks.mqtt import Mqtt
 
-    return Mqtt(place)
+    return Mqtt(target)
 
 
-def _otel(wanted: str, place: str) -> Sink:
+def _otel(spec: str, target: str) -> Sink:
     from visup.sinks.telemetry import Telemetry
 
-    return Telemetry(place)
+    return Telemetry(target)
 
 
-def _notification(wanted: str, place: str) -> Sink:
+def _notification(spec: str, target: str) -> Sink:
     from visup.sinks.notification import Notification
 
-    return Notification(place)
+    return Notification(target)
 
 
-def _rerun(wanted: str, place: str) -> Sink:
+def _rerun(spec: str, target: str) -> Sink:
     from visup.sinks.rerun import Rerun
 
-    return Rerun(place)
+    return Rerun(target)
 
 
-_MAKERS: dict[str, Callable[[str, str], Sink]] = {
+_FACTORIES: dict[str, Callable[[str, str], Sink]] = {
     "jsonl": _jsonl,
     "file": lambda wanted, place: to_file(wanted, Path(place)),
     "mqtt": _mqtt,
@@ -161,29 +161,29 @@ _MAKERS: dict[str, Callable[[str, str], Sink]] = {
     "otel": _otel,
     "rerun": _rerun,
 }
-_OF_STEPS: dict[str, Callable[[Step, Frame], object]] = {
+_STEP_SINKS: dict[str, Callable[[Step, Frame], object]] = {
     "otel": lambda step, frame: step,
     "rerun": lambda step, frame: (step, frame),
 }
 
 
-def _outbox(sink: Sink, number: int, log: DeliveryLog | None) -> Outbox | InsistentOutbox:
+def _outbox(sink: Sink, number: int, log: DeliveryLog | None) -> Outbox | DurableOutbox:
     """The name of an outbox, made unique by its position if two sinks have the same."""
-    if log is None or sink.name.partition(":")[0] in _OF_STEPS:
-        return Outbox(sink, _room(sink))
-    return InsistentOutbox(sink, f"{number} {sink.name}", log)
+    if log is None or sink.name.partition(":")[0] in _STEP_SINKS:
+        return Outbox(sink, _queue_length(sink))
+    return DurableOutbox(sink, f"{number} {sink.name}", log)
 
 
-def _kind(outbox: Outbox | InsistentOutbox) -> str:
+def _kind(outbox: Outbox | DurableOutbox) -> str:
     return outbox.sink.name.partition(":")[0]
 
 
-def _room(sink: Sink) -> int:
-    return MOST_STEPS if sink.name.partition(":")[0] in _OF_STEPS else MOST_WAITING
+def _queue_length(sink: Sink) -> int:
+    return MAX_STEPS if sink.name.partition(":")[0] in _STEP_SINKS else MAX_WAITING
 
 
-def _sender(outbox: Outbox | InsistentOutbox, of: Callable[[Step, Frame], object]) -> Observer:
+def _sender(outbox: Outbox | DurableOutbox, record_of: Callable[[Step, Frame], object]) -> Observer:
     def send(step: Step, frame: Frame) -> None:
-        outbox.offer(of(step, frame))
+        outbox.offer(record_of(step, frame))
 
     return send

@@ -24,18 +24,18 @@ class Rerun:
         ExtraMissingError: rerun-sdk is not installed.
     """
 
-    def __init__(self, place: str) -> None:
+    def __init__(self, target: str) -> None:
         try:
             import rerun
         except ModuleNotFoundError as missing:
             raise ExtraMissingError("a sink for Rerun", "rerun") from missing
-        self.name = f"rerun:{place}"
+        self.name = f"rerun:{target}"
         self._rerun: Any = rerun
         self._stream: Any = rerun.RecordingStream("visup")
-        if "://" in place:
-            self._stream.connect_grpc(place)
+        if "://" in target:
+            self._stream.connect_grpc(target)
         else:
-            self._stream.save(place)
+            self._stream.save(target)
 
     def deliver(self, record: tuple[Step, Frame]) -> None:
         """Log one step."""

@@ -31,13 +31,13 @@ class Telemetry:
         ExtraMissingError: OpenTelemetry is not installed.
     """
 
-    def __init__(self, place: str, providers: tuple[Any, Any] | None = None) -> None:
-        if place not in ("console", "otlp"):
-            raise SettingsError(f"--sink otel:{place}", expected="otel:console or otel:otlp")
-        self.name = f"otel:{place}"
-        self._traces, self._figures = providers or _providers(place)
+    def __init__(self, target: str, providers: tuple[Any, Any] | None = None) -> None:
+        if target not in ("console", "otlp"):
+            raise SettingsError(f"--sink otel:{target}", expected="otel:console or otel:otlp")
+        self.name = f"otel:{target}"
+        self._traces, self._metrics = providers or _providers(target)
         self._tracer = self._traces.get_tracer(NAME)
-        meter = self._figures.get_meter(NAME)
+        meter = self._metrics.get_meter(NAME)
         self._steps = meter.create_counter("visup.steps", description="frames supervised")
         self._events = meter.create_counter("visup.events", description="events by kind")
         self._alerts = meter.create_counter("visup.alerts", description="alerts opened by kind")
@@ -52,7 +52,7 @@ class Telemetry:
 
     def close(self) -> None:
         """Flush."""
-        for provider in (self._traces, self._figures):
+        for provider in (self._traces, self._metrics):
             provider.shutdown()
 
     def _count(self, step: Step) -> None:
@@ -64,44 +64,44 @@ class Telemetry:
             if alert.closed is None:
                 self._alerts.add(1, {"kind": alert.kind})
         for report in step.reports:
-            who = {"behaviour": report.behaviour}
+            attributes = {"behaviour": report.behaviour}
             if report.state is ReportState.RAN:
-                self._duration.record(report.elapsed_ms, who)
-            self._failures.add(int(report.state is ReportState.FAILED), who)
+                self._duration.record(report.elapsed_ms, attributes)
+            self._failures.add(int(report.state is ReportState.FAILED), attributes)
 
     def _trace(self, step: Step) -> None:
         from opentelemetry import trace
 
         end = time.time_ns()
-        took = sum(int(r.elapsed_ms * 1e6) for r in step.reports)
+        duration_ns = sum(int(r.elapsed_ms * 1e6) for r in step.reports)
         facts: Mapping[str, Any] = {"frame_index": step.frame_index, "time": step.time}
-        whole = self._tracer.start_span("step", start_time=end - took, attributes=facts)
+        step_span = self._tracer.start_span("step", start_time=end - duration_ns, attributes=facts)
         for event in step.events:
-            whole.add_event(event.kind, {"text": event.text}, timestamp=end)
-        inside = trace.set_span_in_context(whole)
-        at = end - took
+            step_span.add_event(event.kind, {"text": event.text}, timestamp=end)
+        context = trace.set_span_in_context(step_span)
+        start = end - duration_ns
         for report in step.reports:
             if report.state is ReportState.RESTED:
                 continue
             span = self._tracer.start_span(
                 report.behaviour,
-                inside,
-                start_time=at,
+                context,
+                start_time=start,
                 attributes={"state": report.state.value, "percepts": len(report.percepts)},
             )
-            at += int(report.elapsed_ms * 1e6)
-            span.end(at)
-        whole.end(end)
+            start += int(report.elapsed_ms * 1e6)
+            span.end(start)
+        step_span.end(end)
 
 
-def _providers(place: str) -> tuple[Any, Any]:
+def _providers(target: str) -> tuple[Any, Any]:
     try:
         from opentelemetry.sdk.metrics import MeterProvider
         from opentelemetry.sdk.metrics.export import PeriodicExportingMetricReader
         from opentelemetry.sdk.trace import TracerProvider
         from opentelemetry.sdk.trace.export import BatchSpanProcessor
 
-        spans, metrics = _exporters(place)
+        spans, metrics = _exporters(target)
     except ModuleNotFoundError as missing:
         raise ExtraMissingError("a sink for OpenTelemetry", "otel") from missing
     resource = service_resource()
@@ -121,8 +121,8 @@ def service_resource() -> Any:
     return own.merge(OTELResourceDetector().detect())
 
 
-def _exporters(place: str) -> tuple[Any, Any]:
-    if place == "console":
+def _exporters(target: str) -> tuple[Any, Any]:
+    if target == "console":
         import sys
 
         from opentelemetry.sdk.metrics.export import ConsoleMetricExporter

@@ -23,9 +23,9 @@ from visup.redaction import redacted
 from visup.sinks.lines import TIMEOUT_S, json_text
 from visup.sinks.webhook_access import WebhookAccess
 
-TRIES = 4
-FIRST_WAIT_S = 0.5
-BUSY = 429
+MAX_ATTEMPTS = 4
+INITIAL_WAIT_S = 0.5
+TOO_MANY_REQUESTS = 429
 HEADERS = {"Content-Type": "application/json", "User-Agent": "visup"}
 
 
@@ -36,8 +36,8 @@ class DeliveryError(OSError):
         final: Whether retrying is useless.
     """
 
-    def __init__(self, said: str, *, final: bool = False) -> None:
-        super().__init__(said)
+    def __init__(self, message: str, *, final: bool = False) -> None:
+        super().__init__(message)
         self.final = final
 
 
@@ -65,7 +65,7 @@ class Webhook:
         url: str,
         *,
         timeout_s: float = TIMEOUT_S,
-        tries: int = TRIES,
+        tries: int = MAX_ATTEMPTS,
         access: WebhookAccess | None = None,
         wait: Callable[[float], None] = time.sleep,
     ) -> None:
@@ -73,11 +73,11 @@ class Webhook:
             raise SettingsError(
                 f"--sink webhook:{redacted(url)}", expected="an http or https address"
             )
-        self.name = f"webhook:{_shown(url)}"
+        self.name = f"webhook:{_printable_url(url)}"
         self._url, self._timeout_s, self._tries, self._wait = url, timeout_s, tries, wait
         self._access = access or WebhookAccess()
-        self._opened: list[socket.socket] = []
-        self._manager = _manager(url, self._opened)
+        self._sockets: list[socket.socket] = []
+        self._manager = _manager(url, self._sockets)
 
     def deliver(self, record: Mapping[str, Any]) -> None:
         """Post one record.
@@ -96,10 +96,10 @@ class Webhook:
             else:
                 if 200 <= status < 300:
                     return
-                final = status < 500 and status != BUSY
+                final = status < 500 and status != TOO_MANY_REQUESTS
                 if final or last:
-                    raise DeliveryError(_answer(status), final=final)
-            self._wait(FIRST_WAIT_S * 2**attempt)
+                    raise DeliveryError(_status_text(status), final=final)
+            self._wait(INITIAL_WAIT_S * 2**attempt)
 
     def close(self) -> None:
         """Close the connection."""
@@ -125,70 +125,70 @@ class Webhook:
     @contextmanager
     def _deadline(self) -> Iterator[None]:
         """Close the connection at the deadline, even if the server keeps sending slowly."""
-        over = threading.Event()
-        timer = threading.Timer(self._timeout_s, self._hang_up, (over,))
+        expired = threading.Event()
+        timer = threading.Timer(self._timeout_s, self._shut_down, (expired,))
         timer.daemon = True
         timer.start()
         try:
             yield
         finally:
             timer.cancel()
-            while self._opened:
-                self._opened.pop().close()
-        if over.is_set():  # a partial response may look complete
+            while self._sockets:
+                self._sockets.pop().close()
+        if expired.is_set():  # a partial response may look complete
             raise TimeoutError(ETIMEDOUT, "the server did not answer in time")
 
-    def _hang_up(self, over: threading.Event) -> None:
-        over.set()
-        for opened in list(self._opened):
+    def _shut_down(self, expired: threading.Event) -> None:
+        expired.set()
+        for connection in list(self._sockets):
             with suppress(OSError):
-                opened.shutdown(socket.SHUT_RDWR)
+                connection.shutdown(socket.SHUT_RDWR)
 
 
-def _shown(url: str) -> str:
+def _printable_url(url: str) -> str:
     """A URL that is safe to print: chat services put their keys in the path."""
-    told = parse_url(url)
-    port = f":{told.port}" if told.port else ""
-    beyond = "/..." if (told.path or "/") != "/" or told.query else ""
-    return f"{told.scheme}://{told.host}{port}{beyond}"
+    parts = parse_url(url)
+    port = f":{parts.port}" if parts.port else ""
+    ellipsis = "/..." if (parts.path or "/") != "/" or parts.query else ""
+    return f"{parts.scheme}://{parts.host}{port}{ellipsis}"
 
 
 def _is_web_address(url: str) -> bool:
     try:
-        told = parse_url(url)
+        parts = parse_url(url)
     except LocationParseError:
         return False
-    return told.scheme in ("http", "https") and bool(told.host)
+    return parts.scheme in ("http", "https") and bool(parts.host)
 
 
-def _manager(url: str, opened: list[socket.socket]) -> urllib3.PoolManager:
+def _manager(url: str, sockets: list[socket.socket]) -> urllib3.PoolManager:
     """A connection manager that respects the environment (`https_proxy` etc.) and records its sockets."""
 
-    class Noted(HTTPConnection):
+    class RecordingConnection(HTTPConnection):
         def _new_conn(self) -> socket.socket:
-            return _noted(super()._new_conn(), opened)
+            return _recorded(super()._new_conn(), sockets)
 
-    class NotedTls(HTTPSConnection):
+    class RecordingTlsConnection(HTTPSConnection):
         def _new_conn(self) -> socket.socket:
-            return _noted(super()._new_conn(), opened)
+            return _recorded(super()._new_conn(), sockets)
 
-    told = parse_url(url)
-    proxy = urllib.request.getproxies().get(told.scheme or "")
-    direct = proxy is None or urllib.request.proxy_bypass(told.host or "")
+    parts = parse_url(url)
+    proxy = urllib.request.getproxies().get(parts.scheme or "")
+    direct = proxy is None or urllib.request.proxy_bypass(parts.host or "")
     manager = urllib3.PoolManager() if direct else urllib3.ProxyManager(str(proxy))
-    plain = type("NotedPool", (HTTPConnectionPool,), {"ConnectionCls": Noted})
-    tls = type("NotedTlsPool", (HTTPSConnectionPool,), {"ConnectionCls": NotedTls})
+    plain = type("NotedPool", (HTTPConnectionPool,), {"ConnectionCls": RecordingConnection})
+    tls = type("NotedTlsPool", (HTTPSConnectionPool,), {"ConnectionCls": RecordingTlsConnection})
     manager.pool_classes_by_scheme = {"http": plain, "https": tls}
     return manager
 
 
-def _noted(made: socket.socket, opened: list[socket.socket]) -> socket.socket:
+def _recorded(connection: socket.socket, sockets: list[socket.socket]) -> socket.socket:
     # A duplicate, since the TLS wrapper takes over the original socket.
-    opened.append(made.dup())
-    return made
+    sockets.append(connection.dup())
+    return connection
 
 
-def _answer(status: int) -> str:
+def _status_text(status: int) -> str:
     """A status in our own words: the server's are untrusted."""
     if 300 <= status < 400:
         return f"the server answered {status}: it redirects, which is not followed"

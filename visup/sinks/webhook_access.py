@@ -13,7 +13,7 @@ from visup.agent.model.errors import SettingsError
 TIMESTAMP = "X-Visup-Timestamp"
 SIGNATURE = "X-Visup-Signature"
 _TOKEN = re.compile(r"[A-Za-z0-9!#$%&'*+.^_`|~-]+")
-_OWN = ("content-type", "content-length", "host", TIMESTAMP.lower(), SIGNATURE.lower())
+_RESERVED = ("content-type", "content-length", "host", TIMESTAMP.lower(), SIGNATURE.lower())
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class WebhookAccess:
 
     def __post_init__(self) -> None:
         for name, value in self.headers.items():
-            if not _TOKEN.fullmatch(name) or name.lower() in _OWN:
+            if not _TOKEN.fullmatch(name) or name.lower() in _RESERVED:
                 raise SettingsError(
                     f"the header {name!r} of webhooks cannot be set",
                     expected="a name such as Authorization or X-Api-Key",

@@ -24,26 +24,26 @@ from visup.teaching.outlines import DrawnOutline
 VIDEOS = ("clip.mp4", "video.mp4")
 """Names of a clip's video in its folder."""
 
-LARGEST_BRIEF_BYTES = 16 * 2**20
+MAX_BRIEF_BYTES = 16 * 2**20
 
 EXPECTED = '{"teach": {NAME: {"clip": FOLDER, "frame": N, "polygon": [[x, y], ...]}}}'
 
 
 @dataclass(frozen=True, slots=True)
-class Showing:
+class ClipOutline:
     """An outline, and where it was drawn.
 
     Attributes:
         outline: The outline.
         video: The clip's file.
         frame: Number of the frame, from 0.
-        plays_part: Whether it plays a part in the task; `teach_extra` does not.
+        in_task: Whether it plays a part in the task; `teach_extra` does not.
     """
 
     outline: DrawnOutline
     video: Path
     frame: int
-    plays_part: bool = True
+    in_task: bool = True
 
     @property
     def name(self) -> str:
@@ -51,7 +51,7 @@ class Showing:
         return self.outline.name
 
 
-def read_showings(brief: Path) -> tuple[Showing, ...]:
+def read_clip_outlines(brief: Path) -> tuple[ClipOutline, ...]:
     """All that a brief shows.
 
     Args:
@@ -61,13 +61,16 @@ def read_showings(brief: Path) -> tuple[Showing, ...]:
         SettingsError: It is missing or not as it should be, or a clip that it names is not there.
     """
     path = brief / "brief.json" if brief.is_dir() else brief
-    told = _read(path)
-    family, own = _showings(path, told, "teach"), _showings(path, told, "teach_own")
-    extra = _showings(path, told, "teach_extra")
-    shown = (*(family | own).values(), *(replace(s, plays_part=False) for s in extra.values()))
-    if not shown:
+    document = _read(path)
+    shared, own = (
+        _outlines_by_name(path, document, "teach"),
+        _outlines_by_name(path, document, "teach_own"),
+    )
+    extra = _outlines_by_name(path, document, "teach_extra")
+    outlines = (*(shared | own).values(), *(replace(s, in_task=False) for s in extra.values()))
+    if not outlines:
         raise _unusable(path, "it teaches nothing")
-    return shown
+    return outlines
 
 
 def clip_video(folder: Path) -> Path:
@@ -84,35 +87,37 @@ def clip_video(folder: Path) -> Path:
 
 def _read(path: Path) -> Mapping[str, Any]:
     try:
-        told = json.loads(read_text_file(path, LARGEST_BRIEF_BYTES))
+        document = json.loads(read_text_file(path, MAX_BRIEF_BYTES))
     except OSError as e:
         raise SettingsError(
             f"the brief cannot be read ({e.strerror or e})", where=str(path), expected=EXPECTED
         ) from e
     except ValueError as e:
         raise _unusable(path, f"it is not JSON: {e}") from e
-    if not isinstance(told, Mapping):
+    if not isinstance(document, Mapping):
         raise _unusable(path, "it is no mapping")
-    return told
+    return document
 
 
-def _showings(path: Path, told: Mapping[str, Any], key: str) -> dict[str, Showing]:
+def _outlines_by_name(path: Path, document: Mapping[str, Any], key: str) -> dict[str, ClipOutline]:
     """One part of a brief, by name."""
-    part = told.get(key, {})
+    part = document.get(key, {})
     if not isinstance(part, Mapping):
         raise _unusable(path, f'"{key}" is no mapping of names')
-    return {str(name): _showing(path, f"\"{key}\" of '{name}'", name, part[name]) for name in part}
+    return {
+        str(name): _clip_outline(path, f"\"{key}\" of '{name}'", name, part[name]) for name in part
+    }
 
 
-def _showing(path: Path, where: str, name: str, shown: Any) -> Showing:
+def _clip_outline(path: Path, where: str, name: str, entry: Any) -> ClipOutline:
     try:
-        corners = tuple((float(x), float(y)) for x, y in shown["polygon"])
-        frame = int(shown.get("frame", 0))
-        clip = str(shown.get("clip", path.parent.name))
+        corners = tuple((float(x), float(y)) for x, y in entry["polygon"])
+        frame = int(entry.get("frame", 0))
+        clip = str(entry.get("clip", path.parent.name))
     except (KeyError, TypeError, ValueError, AttributeError) as e:
         fault = f"no {e}" if isinstance(e, KeyError) else str(e)
         raise _unusable(path, f"{where}: {fault}") from e
-    return Showing(DrawnOutline(str(name), corners), _named_video(path, clip), frame)
+    return ClipOutline(DrawnOutline(str(name), corners), _named_video(path, clip), frame)
 
 
 def _named_video(path: Path, clip: str) -> Path:

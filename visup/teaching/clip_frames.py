@@ -15,13 +15,13 @@ from visup.agent.model.errors import SourceError
 from visup.percepts.video import VideoSource, open_source
 from visup.percepts.video.image_folder import UnreadableImageError, read_image
 
-PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm")
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm")
 """Endings of the files that are read as one picture."""
 
-KEPT_BYTES = 1 << 26
+CACHE_BYTES = 1 << 26
 """Frames that were passed are kept up to so many bytes, so that going back a little costs nothing."""
 
-NEAR = 40
+MAX_SEEK = 40
 """Frames further ahead than so many are reached by passing over those before them undecoded."""
 
 Picture = NDArray[np.uint8]
@@ -45,12 +45,12 @@ class ClipFrames:
 
     def __init__(self, source: str) -> None:
         self.name = source
-        self._kept: OrderedDict[int, Picture] = OrderedDict()
+        self._cache: OrderedDict[int, Picture] = OrderedDict()
         self._source: VideoSource | None = None
         self._next = 0
         path = Path(source).expanduser()
-        if path.suffix.lower() in PICTURES and path.is_file():
-            self._kept[0] = _read_picture(path)
+        if path.suffix.lower() in IMAGE_SUFFIXES and path.is_file():
+            self._cache[0] = _read_picture(path)
             self.count: int | None = 1
         else:
             self._source = open_source(source)
@@ -80,13 +80,13 @@ class ClipFrames:
         Raises:
             SourceError: There is no such frame, or it is gone by: a camera cannot be rewound.
         """
-        if number in self._kept:
-            return self._kept[number]
+        if number in self._cache:
+            return self._cache[number]
         if number < 0 or self._source is None:
             raise self._missing(number)
-        return self._read_on(self._at_or_before(self._source, number), number)
+        return self._read_to(self._seek(self._source, number), number)
 
-    def _at_or_before(self, source: VideoSource, number: int) -> VideoSource:
+    def _seek(self, source: VideoSource, number: int) -> VideoSource:
         """The source at or before a frame; what lies before a far one will be passed over undecoded."""
         if source.live:
             return source
@@ -94,29 +94,29 @@ class ClipFrames:
             source.close()
             source, self._next = open_source(self.name), 0
             self._source = source
-        if number >= self._next + NEAR:
+        if number >= self._next + MAX_SEEK:
             source.span = (number, None)
         return source
 
-    def _read_on(self, source: VideoSource, number: int) -> Picture:
+    def _read_to(self, source: VideoSource, number: int) -> Picture:
         while self._next <= number:
             frame = next(source, None)
             if frame is None:
                 self._next = number + 1  # so that a frame before is looked for from the start
                 raise self._missing(number)
             self._next = frame.index + 1
-            self._keep(frame)
-        if number not in self._kept:
+            self._store(frame)
+        if number not in self._cache:
             raise SourceError(
                 f"frame {number} has gone by", where=self.name, hint="a camera cannot be rewound"
             )
-        return self._kept[number]
+        return self._cache[number]
 
-    def _keep(self, frame: Frame) -> None:
-        self._kept[frame.index] = frame.image
-        self._kept.move_to_end(frame.index)
-        while len(self._kept) > max(2, KEPT_BYTES // max(1, frame.image.nbytes)):
-            self._kept.popitem(last=False)
+    def _store(self, frame: Frame) -> None:
+        self._cache[frame.index] = frame.image
+        self._cache.move_to_end(frame.index)
+        while len(self._cache) > max(2, CACHE_BYTES // max(1, frame.image.nbytes)):
+            self._cache.popitem(last=False)
 
     def _missing(self, number: int) -> SourceError:
         expected = f"0 to {self.count - 1}" if self.count else "a frame's number, from 0"

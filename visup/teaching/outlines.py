@@ -106,14 +106,14 @@ def join_corners(words: Sequence[str], flag: str = "--outline") -> list[str]:
     ['clip.mp4', '--outline', 'part=1,2 3,4 5,6', '--models', 'a.models']
     """
     joined: list[str] = []
-    follows = inside = False
+    expects_outline = in_outline = False
     for word in words:
-        if follows or word.startswith(f"{flag}="):
+        if expects_outline or word.startswith(f"{flag}="):
             joined.append(word)
-            follows, inside = False, True
-        elif inside and _LOOKS_LIKE_CORNERS.fullmatch(word):
+            expects_outline, in_outline = False, True
+        elif in_outline and _LOOKS_LIKE_CORNERS.fullmatch(word):
             joined[-1] += f" {word}"
         else:
             joined.append(word)
-            follows, inside = word == flag, False
+            expects_outline, in_outline = word == flag, False
     return joined

@@ -109,7 +109,7 @@ def test_things_are_done_when_they_are_due() -> None:
     )
     for second in range(60):
         now = float(second)
-        table.turn(now)
+        table.tick(now)
     expected = [("a", t) for t in (10.0, 20.0, 30.0, 40.0, 50.0)] + [("b", 25.0), ("b", 50.0)]
     assert sorted(done) == expected
 

@@ -8,13 +8,13 @@ from visup.agent import Presence
 from visup.agent.model.errors import OutputError, SettingsError
 from visup.console.run_view import RunView
 from visup.percepts.taught.taught_view import taught_view_from_mask
-from visup.teaching.lesson import Lesson, store
+from visup.teaching.outline_teaching import TeachingResult, store
 
 MODELS = "console.models"
 """The model database in the `save_to` folder; further views are added to it."""
 
 
-def remember(run: RunView, number: int, object_id: int, name: str, folder: Path) -> Lesson:
+def remember(run: RunView, number: int, object_id: int, name: str, folder: Path) -> TeachingResult:
     """Save the appearance of an object at a moment as a view of a model.
 
     Args:

@@ -11,7 +11,7 @@ from visup.agent.model.errors import SettingsError
 from visup.evaluation.machines.scores import Interval, MachineTruth, TrueBoxes
 from visup.evaluation.missions.files import read_json
 from visup.evaluation.missions.scores import TrueStage
-from visup.teaching.briefs import Showing, clip_video, read_showings
+from visup.teaching.briefs import ClipOutline, clip_video, read_clip_outlines
 
 TOLERANCE_S = 0.7
 """Least tolerance of annotated times, seconds."""
@@ -35,12 +35,12 @@ class Brief:
     video: Path
     family: str
     task: str
-    actors: tuple[Showing, ...]
-    others: tuple[Showing, ...] = ()
+    actors: tuple[ClipOutline, ...]
+    others: tuple[ClipOutline, ...] = ()
     fov_vertical_deg: float | None = None
 
     @property
-    def shown(self) -> tuple[Showing, ...]:
+    def shown(self) -> tuple[ClipOutline, ...]:
         """All outlines, actors first."""
         return (*self.actors, *self.others)
 
@@ -68,7 +68,7 @@ def read_brief(folder: Path) -> Brief:
         SettingsError: The brief or a video is missing, or the brief is not valid.
     """
     path = folder / "brief.json"
-    shown, told = read_showings(path), read_json(path)
+    shown, told = read_clip_outlines(path), read_json(path)
     if "task" not in told:
         raise SettingsError(
             'this brief cannot be used: it names no "task"',
@@ -81,8 +81,8 @@ def read_brief(folder: Path) -> Brief:
         clip_video(folder),
         str(told.get("family", folder.name)),
         str(folder / task) if (folder / task).is_file() else task,
-        tuple(s for s in shown if s.plays_part),
-        tuple(s for s in shown if not s.plays_part),
+        tuple(s for s in shown if s.in_task),
+        tuple(s for s in shown if not s.in_task),
         told.get("fov_vertical_deg"),
     )
 

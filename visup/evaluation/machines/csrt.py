@@ -26,7 +26,7 @@ from visup.agent import (
 from visup.agent.contract.behaviour import Contract
 from visup.evaluation.machines.clips import Brief
 from visup.percepts.taught.taught_view import TaughtView
-from visup.teaching.lesson import views_of
+from visup.teaching.outline_teaching import views_of
 from visup.testing import region_of
 
 SIMILARITY = 0.9

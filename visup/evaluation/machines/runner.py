@@ -26,7 +26,7 @@ from visup.evaluation.machines.scores import MachineReport, machine_scores, mach
 from visup.runs.wiring import WatchSettings, build_agent, open_video, reasoning_agent
 from visup.tasks import load_tasks
 from visup.tasks.grammar.structure import task_actors
-from visup.teaching.lesson import store, views_of
+from visup.teaching.outline_teaching import store, views_of
 
 
 def evaluate_machines(

@@ -24,7 +24,7 @@ from visup.evaluation.figures import Progress, silent
 from visup.percepts.taught.taught_view import TaughtView, taught_view_from_mask
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import build_agent
-from visup.teaching.lesson import store
+from visup.teaching.outline_teaching import store
 
 Image = NDArray[np.uint8]
 

@@ -57,7 +57,7 @@ class Timetable:
     every: Sequence[tuple[float, Callable[[], None]]]
     _due: list[float] = field(default_factory=list)
 
-    def turn(self, now: float) -> None:
+    def tick(self, now: float) -> None:
         """Do what is due."""
         if not self._due:
             self._due = [now + every for every, _ in self.every]

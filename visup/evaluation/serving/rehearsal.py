@@ -166,9 +166,9 @@ class Rehearsal:
             while (now := time.monotonic()) < end and process.poll() is None:
                 self._look(process.pid)
                 if now < end - CALM_S:
-                    table.turn(now)
+                    table.tick(now)
                 self._end_what_is_due(now)
-                books.turn(now)
+                books.tick(now)
                 left = (end - now) / 60.0
                 progress(f"{left:.1f} minutes left, {len(self._killer.kills)} kills")
                 time.sleep(LOOK_S)

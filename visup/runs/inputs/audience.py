@@ -10,7 +10,7 @@ from visup.agent.model.step import Observer
 
 if TYPE_CHECKING:
     from visup.runs.operator import HumanOperator
-    from visup.runs.unattended.next_run import RunPlaces
+    from visup.runs.unattended.next_run import RunFolders
 
 
 class RunProgress(Protocol):
@@ -53,7 +53,7 @@ class Audience:
         operator: Answers questions; None by default.
         notice: Receives messages that cannot wait for a step, such as that a camera dropped: one sentence.
         figures: Receives the figures after each step.
-        places: Folders for runs that follow a live one; None if none follows.
+        run_folders: Folders for runs that follow a live one; None if none follows.
     """
 
     observers: Sequence[Observer] = ()
@@ -61,4 +61,4 @@ class Audience:
     operator: HumanOperator | None = None
     notice: Callable[[str], None] | None = None
     figures: Callable[[RunFigures], None] | None = None
-    places: RunPlaces | None = None
+    run_folders: RunFolders | None = None

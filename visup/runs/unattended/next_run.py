@@ -24,10 +24,10 @@ RETRY_S = 60.0
 """Seconds between attempts to start the next run."""
 
 
-class RunPlaces(Protocol):
+class RunFolders(Protocol):
     """Provides the folders for the runs of a camera."""
 
-    def place(self) -> Path:
+    def next_folder(self) -> Path:
         """A folder for a further run, not yet created.
 
         Raises:
@@ -35,7 +35,7 @@ class RunPlaces(Protocol):
         """
         ...
 
-    def go_on_with(self, run: Path) -> None:
+    def set_current(self, run: Path) -> None:
         """Make a process that starts from now on resume this run.
 
         Raises:

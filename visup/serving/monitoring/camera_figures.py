@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from math import isfinite
 from typing import Any
 
-COUNTED = ("frames", "dropped", "cpu_s", "alerts_info", "alerts_warning", "alerts_critical")
+COUNTERS = ("frames", "dropped", "cpu_s", "alerts_info", "alerts_warning", "alerts_critical")
 PHASE = "ms_"
 """Prefix of the name of a phase; the value is its time in milliseconds."""
 
-MEASURED = ("lag_s", "objects", "alerts_open")
+GAUGES = ("lag_s", "objects", "alerts_open")
 
 
 class CameraFigures:
@@ -22,27 +22,32 @@ class CameraFigures:
 
     def __init__(self) -> None:
         self.latest: dict[str, float] = {}
-        self._before: dict[str, float] = {}
-        self._now: dict[str, float] = {}
+        self._earlier_processes: dict[str, float] = {}
+        self._this_process: dict[str, float] = {}
 
-    def take(self, reported: Mapping[str, Any]) -> None:
+    def update(self, reported: Mapping[str, Any]) -> None:
         """Store the figures that a process reports; values that are not finite numbers are ignored."""
         for name, value in reported.items():
             if not isinstance(value, int | float) or isinstance(value, bool) or not isfinite(value):
                 continue
-            if name in COUNTED or name.startswith(PHASE):
-                self._now[name] = float(value)
-            elif name in MEASURED:
+            if name in COUNTERS or name.startswith(PHASE):
+                self._this_process[name] = float(value)
+            elif name in GAUGES:
                 self.latest[name] = float(value)
 
     def process_ended(self) -> None:
         """Start again from 0 for the next process."""
-        self._before = dict(self.totals)
-        self._now = {}
+        self._earlier_processes = dict(self.totals)
+        self._this_process = {}
         self.latest = {}
 
     @property
     def totals(self) -> Mapping[str, float]:
         """The counters over all processes so far."""
-        names = [*self._before, *(n for n in self._now if n not in self._before)]
-        return {n: self._before.get(n, 0.0) + self._now.get(n, 0.0) for n in names}
+        names = [
+            *self._earlier_processes,
+            *(n for n in self._this_process if n not in self._earlier_processes),
+        ]
+        return {
+            n: self._earlier_processes.get(n, 0.0) + self._this_process.get(n, 0.0) for n in names
+        }

@@ -19,13 +19,13 @@ from visup.agent.model.errors import ExtraMissingError, OutputError
 from visup.serving.monitoring.prometheus import metrics_page
 from visup.serving.monitoring.status import SiteStatus
 
-PATIENCE_S = 5.0
+CLIENT_TIMEOUT_S = 5.0
 """Socket timeout for a client, seconds."""
 
-MOST_CLIENTS = 16
+MAX_CLIENTS = 16
 """Concurrent requests; further ones are closed at once."""
 
-Answer = tuple[HTTPStatus, bytes, str]
+Response = tuple[HTTPStatus, bytes, str]
 
 
 class MonitoringServer:
@@ -67,7 +67,7 @@ class MonitoringServer:
         self._server.shutdown()
         self._server.server_close()
 
-    def answer(self, path: str, accept: str = "") -> Answer:
+    def answer(self, path: str, accept: str = "") -> Response:
         """The response to a path: status, body, content type."""
         status, now = self.status, self._clock()
         if path == "/healthz":
@@ -87,7 +87,7 @@ class MonitoringServer:
         answer = self.answer
 
         class MonitoringHandler(BaseHTTPRequestHandler):
-            timeout = PATIENCE_S
+            timeout = CLIENT_TIMEOUT_S
             server_version, sys_version = "visup", ""
 
             def do_GET(self) -> None:
@@ -113,10 +113,10 @@ class MonitoringServer:
 
 class _BoundedServer(ThreadingHTTPServer):
     daemon_threads = True
-    request_queue_size = MOST_CLIENTS
+    request_queue_size = MAX_CLIENTS
 
     def __init__(self, *arguments: Any) -> None:
-        self._free_slots = threading.BoundedSemaphore(MOST_CLIENTS)
+        self._free_slots = threading.BoundedSemaphore(MAX_CLIENTS)
         super().__init__(*arguments)
 
     def process_request(self, request: Any, client_address: Any) -> None:
@@ -143,6 +143,6 @@ def _server_of(host: str) -> type[_BoundedServer]:
 _TEXT = "text/plain; charset=utf-8"
 
 
-def _json(ok: bool, body: dict[str, Any]) -> Answer:
+def _json(ok: bool, body: dict[str, Any]) -> Response:
     status = HTTPStatus.OK if ok else HTTPStatus.SERVICE_UNAVAILABLE
     return status, json.dumps(body).encode() + b"\n", "application/json"

@@ -130,7 +130,7 @@ class _Collector:
         from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
 
         room = GaugeMetricFamily("visup_store_bytes", "Room of the store.", labels=["kind"])
-        for kind, size in self._status.room.items():
+        for kind, size in self._status.disk_usage.items():
             room.add_metric([kind], size)
         deleted = CounterMetricFamily(
             "visup_store_deleted", "What was deleted to make room.", labels=["kind"]

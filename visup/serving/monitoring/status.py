@@ -40,13 +40,13 @@ class SiteStatus:
     Attributes:
         at: Time of the status, seconds of the monitoring server's clock.
         cameras: In the order of the file.
-        room: Bytes by kind, such as 'free' and 'evidence'.
+        disk_usage: Bytes by kind, such as 'free' and 'evidence'.
         deleted: Counts of what was deleted to free space, by kind.
     """
 
     at: float
     cameras: tuple[CameraStatus, ...] = ()
-    room: Mapping[str, float] = field(default_factory=dict)
+    disk_usage: Mapping[str, float] = field(default_factory=dict)
     deleted: Mapping[str, float] = field(default_factory=dict)
 
     def healthy(self, now: float) -> bool:

@@ -22,7 +22,7 @@ from visup.sinks.webhook_access import WebhookAccess
 from visup.tasks import shipped_tasks
 from visup.version import __version__
 
-PIECE_BYTES = 2**20
+READ_BYTES = 2**20
 CLOSING_S = 2.0
 """How long a sink may take at the end of a run, seconds: a stopped service closes within five."""
 
@@ -31,13 +31,13 @@ RESERVE_BYTES = 4 * 2**20
 
 
 def camera_of(
-    site: SiteTable, one: CameraTable, folder: Path, environment: Mapping[str, str]
+    site: SiteTable, camera: CameraTable, folder: Path, environment: Mapping[str, str]
 ) -> SiteCamera:
     """A camera with the settings and options of its runs.
 
     Args:
         site: The whole file.
-        one: The camera's table.
+        camera: The camera's table.
         folder: Folder of the site file, absolute.
         environment: Values of placeholders.
 
@@ -45,40 +45,40 @@ def camera_of(
         SettingsError: A placeholder cannot be replaced.
     """
     settings = WatchSettings(
-        source=_source(filled(one.source, environment, folder), folder),
-        tasks=tuple(_task(t, folder) for t in one.tasks),
-        models=_optional(one.models, folder),
-        actors={a: (m,) if isinstance(m, str) else m for a, m in one.actors.items()},
-        bystanders=one.bystanders,
-        rules=tuple(_path(r, folder) for r in one.rules),
-        zones=_optional(one.zones, folder),
-        signals=tuple(s if s.startswith(BROKER) else _path(s, folder) for s in one.signals),
-        detections=_optional(one.detections, folder),
+        source=_source(filled(camera.source, environment, folder), folder),
+        tasks=tuple(_task(t, folder) for t in camera.tasks),
+        models=_optional(camera.models, folder),
+        actors={a: (m,) if isinstance(m, str) else m for a, m in camera.actors.items()},
+        bystanders=camera.bystanders,
+        rules=tuple(_path(r, folder) for r in camera.rules),
+        zones=_optional(camera.zones, folder),
+        signals=tuple(s if s.startswith(BROKER) else _path(s, folder) for s in camera.signals),
+        detections=_optional(camera.detections, folder),
         behaviours=tuple(
-            b if MODULE_PATH.fullmatch(b) else _path(b, folder) for b in one.behaviours
+            b if MODULE_PATH.fullmatch(b) else _path(b, folder) for b in camera.behaviours
         ),
-        plugins=one.plugins,
-        isolate=one.isolate,
-        preset=one.preset,
-        pace=one.pace,
-        fps=one.fps,
-        fov_vertical_deg=one.fov,
-        realtime=one.realtime,
-        patience_s=one.patience_s,
-        attention=one.attention,
-        rest_s=one.rest_s or None,
+        plugins=camera.plugins,
+        isolate=camera.isolate,
+        preset=camera.preset,
+        pace=camera.pace,
+        fps=camera.fps,
+        fov_vertical_deg=camera.fov,
+        realtime=camera.realtime,
+        patience_s=camera.patience_s,
+        attention=camera.attention,
+        rest_s=camera.rest_s or None,
     )
-    QuietHours.read(one.quiet, site.timezone)  # reports mistakes now
-    options = _options(site, one, folder, environment)
+    QuietHours.read(camera.quiet, site.timezone)  # reports mistakes now
+    options = _options(site, camera, folder, environment)
     limits = ProcessLimits(site.limits.memory_mb, site.limits.silent_s, site.limits.start_s)
-    return SiteCamera(one.name, settings, options, limits, _fingerprint(settings))
+    return SiteCamera(camera.name, settings, options, limits, _fingerprint(settings))
 
 
 def _options(
-    site: SiteTable, one: CameraTable, folder: Path, environment: Mapping[str, str]
+    site: SiteTable, camera: CameraTable, folder: Path, environment: Mapping[str, str]
 ) -> RunOptions:
     """How the runs of a camera are recorded, and where its alerts go."""
-    sinks = (filled(s, environment, folder) for s in (*site.sinks, *one.sinks))
+    sinks = (filled(s, environment, folder) for s in (*site.sinks, *camera.sinks))
     access = _access(site, folder, environment)
     return RunOptions(
         video=site.recording.video,
@@ -86,33 +86,33 @@ def _options(
         sinks=tuple(_sink(s, folder) for s in dict.fromkeys(sinks)),
         keep_gb=site.recording.keep_gb,
         state_every_s=site.recording.state_every,
-        camera=one.name,
+        camera=camera.name,
         webhook_headers=access.headers,
         webhook_key=access.key,
         closing_s=CLOSING_S,
-        evidence=_evidence(site, one),
+        evidence=_evidence(site, camera),
         run_s=3600.0 * site.recording.run_hours,
         run_bytes=int(1e9 * site.recording.run_gb),
-        quiet=one.quiet,
+        quiet=camera.quiet,
         timezone=site.timezone,
         reserve_bytes=RESERVE_BYTES,
     )
 
 
-def _evidence(site: SiteTable, one: CameraTable) -> EvidenceOptions | None:
+def _evidence(site: SiteTable, camera: CameraTable) -> EvidenceOptions | None:
     evidence = site.evidence
     if not evidence.wanted:
         return None
-    link = None if evidence.link is None else f"{evidence.link.rstrip('/')}/{one.name}"
+    link = None if evidence.link is None else f"{evidence.link.rstrip('/')}/{camera.name}"
     free = 1e9 * site.retention.free_gb
     return EvidenceOptions(evidence.before_s, evidence.after_s, evidence.memory_mb, link, free)
 
 
 def _access(site: SiteTable, folder: Path, environment: Mapping[str, str]) -> WebhookAccess:
-    evidence = site.webhooks
+    webhooks = site.webhooks
     return WebhookAccess(
-        headers={k: filled(v, environment, folder) for k, v in evidence.headers.items()},
-        key=None if evidence.key is None else filled(evidence.key, environment, folder),
+        headers={k: filled(v, environment, folder) for k, v in webhooks.headers.items()},
+        key=None if webhooks.key is None else filled(webhooks.key, environment, folder),
     )
 
 
@@ -137,8 +137,8 @@ def _task(name: str, folder: Path) -> str:
 
 
 def _sink(name: str, folder: Path) -> str:
-    kind, colon, place = name.partition(":")
-    return f"{kind}:{_path(place, folder)}" if colon and kind == "file" else name
+    kind, colon, target = name.partition(":")
+    return f"{kind}:{_path(target, folder)}" if colon and kind == "file" else name
 
 
 def _fingerprint(settings: WatchSettings) -> str:
@@ -159,16 +159,16 @@ def _files(settings: WatchSettings) -> Iterator[Path]:
     """Files that a run reads when it begins, without the source."""
     texts = map(str, (*settings.tasks, *settings.signals, *settings.behaviours))
     # The name of a task may follow its file: `cell.task:pick`.
-    named = (Path(part) for text in texts for part in (text, text.rpartition(":")[0]) if part)
+    paths = (Path(part) for text in texts for part in (text, text.rpartition(":")[0]) if part)
     others = (*settings.rules, settings.models, settings.zones, settings.detections)
-    yield from (path for path in (*named, *filter(None, others)) if path.is_file())
+    yield from (path for path in (*paths, *filter(None, others)) if path.is_file())
 
 
 def _digest(path: Path) -> bytes:
     digest = hashlib.sha256()
     try:
         with path.open("rb") as file:
-            while piece := file.read(PIECE_BYTES):
+            while piece := file.read(READ_BYTES):
                 digest.update(piece)
     except OSError:
         return b""  # an unreadable file is reported when the run begins

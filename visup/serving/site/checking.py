@@ -61,13 +61,13 @@ def check_camera(camera: SiteCamera, *, speed: bool = True) -> CameraCheck:
 
 def store_fault(site: Site) -> str | None:
     """Why runs cannot be written to the store, or None."""
-    place = site.store
-    while not place.exists():
-        place = place.parent
-    if place.is_dir() and os.access(place, os.W_OK):
+    folder = site.store
+    while not folder.exists():
+        folder = folder.parent
+    if folder.is_dir() and os.access(folder, os.W_OK):
         return None
     return (
-        f"the store {site.store} cannot be written: {place} is not a folder that you may write to"
+        f"the store {site.store} cannot be written: {folder} is not a folder that you may write to"
     )
 
 

@@ -10,7 +10,7 @@ from visup.serving.site.form import ConsoleTable
 from visup.serving.site.placeholders import filled
 from visup.serving.site.records import SiteConsole
 
-SHORTEST_TOKEN = 16
+MIN_TOKEN_LENGTH = 16
 """Characters, as in `visup console`."""
 
 
@@ -48,10 +48,10 @@ def address_of(listen: str) -> tuple[str, int] | None:
 
 
 def _token(token: str) -> str:
-    if len(token) < SHORTEST_TOKEN or not token.isascii():
+    if len(token) < MIN_TOKEN_LENGTH or not token.isascii():
         raise SettingsError(
             "a token of the console is too short, or not of plain letters",
-            expected=f"at least {SHORTEST_TOKEN} letters and digits",
+            expected=f"at least {MIN_TOKEN_LENGTH} letters and digits",
         )
     return token
 

@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from visup.runs.inputs.presets import PRESETS
 
-MOST_CAMERAS = 64
+MAX_CAMERAS = 64
 
 Names = tuple[str, ...]
 
@@ -219,7 +219,7 @@ class SiteTable(_Table):
     )
     camera: tuple[CameraTable, ...] = Field(
         description="One table [[camera]] for each camera.",
-        json_schema_extra={"minItems": 1, "maxItems": MOST_CAMERAS},
+        json_schema_extra={"minItems": 1, "maxItems": MAX_CAMERAS},
     )
 
 

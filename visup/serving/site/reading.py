@@ -16,11 +16,11 @@ from visup.agent.model.errors import ErrorGroup, SettingsError, SourceLocation, 
 from visup.agent.storage.text_file import read_text_file
 from visup.serving.site.camera_settings import camera_of
 from visup.serving.site.console_settings import address_of, console_of
-from visup.serving.site.form import MOST_CAMERAS, CameraTable, RetentionTable, SiteTable
+from visup.serving.site.form import MAX_CAMERAS, CameraTable, RetentionTable, SiteTable
 from visup.serving.site.records import RetentionLimits, Site
 from visup.serving.site.toml_lines import locate, syntax_location
 
-LONGEST_VALUE = 80
+MAX_VALUE_LENGTH = 80
 
 
 def read_site(path: Path, environment: Mapping[str, str] | None = None) -> Site:
@@ -39,9 +39,9 @@ def read_site(path: Path, environment: Mapping[str, str] | None = None) -> Site:
     variables = os.environ if environment is None else environment
     faults: list[VisupError] = []
     cameras = []
-    for number, one in enumerate(table.camera):
+    for number, camera in enumerate(table.camera):
         try:
-            cameras.append(camera_of(table, one, path.resolve().parent, variables))
+            cameras.append(camera_of(table, camera, path.resolve().parent, variables))
         except VisupError as fault:
             where = locate(text, ("camera", number), str(path))
             faults.append(
@@ -87,10 +87,10 @@ def _table(text: str, path: Path) -> SiteTable:
     try:
         document = tomllib.loads(text)
     except (ValueError, RecursionError) as fault:
-        shown = str(fault)
+        message = str(fault)
         raise SettingsError(
-            f"this is not TOML: {shown.partition(' (at ')[0]}",
-            where=syntax_location(text, shown, str(path)),
+            f"this is not TOML: {message.partition(' (at ')[0]}",
+            where=syntax_location(text, message, str(path)),
         ) from fault
     try:
         # TOML lists become tuples, which strict pydantic accepts from JSON only.
@@ -102,11 +102,11 @@ def _table(text: str, path: Path) -> SiteTable:
 
 def _messages(faults: Sequence[Mapping[str, Any]], text: str, path: Path) -> list[VisupError]:
     """Mistakes in the terms of the file, in the order of their lines."""
-    by_place: dict[tuple[str | int, ...], list[Mapping[str, Any]]] = {}
+    by_location: dict[tuple[str | int, ...], list[Mapping[str, Any]]] = {}
     for fault in faults:
         loc = tuple(part for part in fault["loc"] if part not in _ALTERNATIVES)
-        by_place.setdefault(loc, []).append(fault)
-    located = [(locate(text, loc, str(path)), loc, shown) for loc, shown in by_place.items()]
+        by_location.setdefault(loc, []).append(fault)
+    located = [(locate(text, loc, str(path)), loc, shown) for loc, shown in by_location.items()]
     located.sort(key=lambda each: (each[0].line, each[0].column))
     return [_mistake(where, loc, shown) for where, loc, shown in located]
 
@@ -128,10 +128,10 @@ def _mistake(
         return SettingsError(
             f"'{key}' is missing", where=where, expected=_CAMERA if key == "camera" else None
         )
-    shown = ".".join(str(part) for part in loc if not isinstance(part, int))
-    wanted = " or ".join(dict.fromkeys(map(_expected, faults)))
+    name = ".".join(str(part) for part in loc if not isinstance(part, int))
+    expected = " or ".join(dict.fromkeys(map(_expected, faults)))
     value = _quoted(faults[0]["input"])
-    return SettingsError(f"{shown} cannot be {value}", where=where, expected=wanted)
+    return SettingsError(f"{name} cannot be {value}", where=where, expected=expected)
 
 
 _CAMERA = '[[camera]], name = "cell", source = "rtsp://..."'
@@ -142,8 +142,8 @@ _ALTERNATIVES = ("str", "tuple[str, ...]")
 def _expected(fault: Mapping[str, Any]) -> str:
     if fault["type"] == "string_pattern_mismatch":
         return _PATTERNS[str(fault["loc"][-1])]
-    shown = str(fault["msg"]).removeprefix("Value error, ").removeprefix("Input should be ")
-    return _PLAIN_TYPES.get(shown, shown.replace("a valid ", "a "))
+    message = str(fault["msg"]).removeprefix("Value error, ").removeprefix("Input should be ")
+    return _PLAIN_TYPES.get(message, message.replace("a valid ", "a "))
 
 
 _PATTERNS = {
@@ -160,8 +160,8 @@ _PLAIN_TYPES = {
 
 
 def _quoted(value: object) -> str:
-    shown = repr(value)
-    return shown if len(shown) <= LONGEST_VALUE else f"{shown[:LONGEST_VALUE]}..."
+    text = repr(value)
+    return text if len(text) <= MAX_VALUE_LENGTH else f"{text[:MAX_VALUE_LENGTH]}..."
 
 
 def _keys(table: Sequence[str | int]) -> tuple[str, ...]:
@@ -175,25 +175,25 @@ def _keys(table: Sequence[str | int]) -> tuple[str, ...]:
 
 
 def _count_faults(table: SiteTable, path: Path) -> Iterator[VisupError]:
-    if not 1 <= len(table.camera) <= MOST_CAMERAS:
+    if not 1 <= len(table.camera) <= MAX_CAMERAS:
         yield SettingsError(
             f"there are {len(table.camera)} cameras in it",
             where=str(path),
-            expected=f"1 to {MOST_CAMERAS} tables, such as {_CAMERA}",
+            expected=f"1 to {MAX_CAMERAS} tables, such as {_CAMERA}",
         )
 
 
 def _duplicate_names(table: SiteTable, text: str, path: Path) -> Iterator[VisupError]:
     """Duplicate names: such cameras would share a folder. File systems may ignore case."""
     seen: set[str] = set()
-    for number, one in enumerate(table.camera):
-        if one.name.casefold() in seen:
+    for number, camera in enumerate(table.camera):
+        if camera.name.casefold() in seen:
             yield SettingsError(
-                f"two cameras are called '{one.name}'",
+                f"two cameras are called '{camera.name}'",
                 where=locate(text, ("camera", number, "name"), str(path)),
                 expected="a name of its own for each camera",
             )
-        seen.add(one.name.casefold())
+        seen.add(camera.name.casefold())
 
 
 def _raise_if_any(faults: list[VisupError]) -> None:

@@ -25,9 +25,9 @@ def locate(text: str, path: Sequence[str | int], file: str) -> SourceLocation:
         path: Keys and indices from the top.
         file: Its name.
     """
-    wanted, found, depth = tuple(path), SourceLocation(file, 1, 1), -1
-    for place, location in _places(text, file):
-        shared = len(place) if wanted[: len(place)] == place else -1
+    target, found, depth = tuple(path), SourceLocation(file, 1, 1), -1
+    for key_path, location in _key_locations(text, file):
+        shared = len(key_path) if target[: len(key_path)] == key_path else -1
         if shared > depth:
             found, depth = location, shared
     return found
@@ -49,7 +49,7 @@ def syntax_location(text: str, fault: str, file: str) -> SourceLocation:
     return SourceLocation(file, line, column, _line(lines, line))
 
 
-def _places(text: str, file: str) -> Iterator[tuple[KeyPath, SourceLocation]]:
+def _key_locations(text: str, file: str) -> Iterator[tuple[KeyPath, SourceLocation]]:
     """Each header and each key with its location, in their order."""
     tables: Counter[str] = Counter()
     table: KeyPath = ()

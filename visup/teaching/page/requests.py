@@ -11,73 +11,73 @@ from typing import Any
 from visup.agent.model.errors import SettingsError
 from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.teaching.clip_frames import ClipFrames
-from visup.teaching.lesson import Lesson, teach_outlines
+from visup.teaching.outline_teaching import TeachingResult, teach_outlines
 from visup.teaching.outlines import DrawnOutline
 from visup.teaching.snapping import snapped
 
-MOST_THINGS = 200
-MOST_CORNERS = 5000
+MAX_OUTLINES = 200
+MAX_CORNERS = 5000
 
-Answer = dict[str, Any]
+Response = dict[str, Any]
 
 
-def clip_facts(frames: ClipFrames, frame: int, models: Path) -> Answer:
+def clip_facts(frames: ClipFrames, frame: int, models: Path) -> Response:
     """What the page shows at first: the clip, the database, and the names that it knows.
 
     Raises:
         DatabaseError: The database is damaged.
     """
-    known = ModelDatabase.open(models) if models.exists() else None
-    taught = Counter(v.name for v in known.taught) if known else Counter()
+    database = ModelDatabase.open(models) if models.exists() else None
+    taught = Counter(v.name for v in database.taught) if database else Counter()
     return {
         "clip": frames.name,
         "count": frames.count,
         "frame": frame,
         "models": str(models),
-        "known": {name: taught[name] for name in known.names()} if known else {},
+        "known": {name: taught[name] for name in database.names()} if database else {},
     }
 
 
-def snap(frames: ClipFrames, asked: Mapping[str, Any]) -> Answer:
+def snap(frames: ClipFrames, request: Mapping[str, Any]) -> Response:
     """The corners of an outline, snapped to the edges near it.
 
     Raises:
         VisupError: It is no outline, or the frame is not there.
     """
-    outline = _outline({"name": "outline", **asked})
-    return {"corners": snapped(frames.at(_number(asked)), outline).corners}
+    outline = _outline({"name": "outline", **request})
+    return {"corners": snapped(frames.at(_number(request)), outline).corners}
 
 
-def save(frames: ClipFrames, models: Path, asked: Mapping[str, Any]) -> Lesson:
+def save(frames: ClipFrames, models: Path, request: Mapping[str, Any]) -> TeachingResult:
     """Store things that were drawn, all or nothing.
 
     Raises:
         VisupError: One has no name, or shows nothing.
     """
-    things = asked.get("things")
-    if not isinstance(things, Sequence) or not 0 < len(things) <= MOST_THINGS:
+    things = request.get("things")
+    if not isinstance(things, Sequence) or not 0 < len(things) <= MAX_OUTLINES:
         raise SettingsError("nothing was outlined", expected="at least one outline with its name")
     return teach_outlines(frames, [(_number(t), _outline(t)) for t in things], models)
 
 
-def _number(asked: object) -> int:
-    number = asked.get("frame") if isinstance(asked, Mapping) else None
+def _number(request: object) -> int:
+    number = request.get("frame") if isinstance(request, Mapping) else None
     if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < 1 << 31:
         raise SettingsError(f"{number!r} is not the number of a frame")
     return number
 
 
-def _outline(asked: Mapping[str, Any]) -> DrawnOutline:
-    name, corners = asked.get("name"), asked.get("corners")
+def _outline(request: Mapping[str, Any]) -> DrawnOutline:
+    name, corners = request.get("name"), request.get("corners")
     if not isinstance(name, str) or not name.strip():
         raise SettingsError("an outline has no name yet", hint="give it one in the list")
-    if not isinstance(corners, list) or not 3 <= len(corners) <= MOST_CORNERS:
+    if not isinstance(corners, list) or not 3 <= len(corners) <= MAX_CORNERS:
         raise SettingsError(f"the outline of '{name}' has too few corners", expected="at least 3")
     return DrawnOutline(name.strip(), tuple(_corner(name, c) for c in corners))
 
 
 def _corner(name: str, corner: object) -> tuple[float, float]:
-    sound = isinstance(corner, list) and len(corner) == 2
-    if sound and all(isinstance(n, int | float) and math.isfinite(n) for n in corner):  # type: ignore[attr-defined]
+    is_pair = isinstance(corner, list) and len(corner) == 2
+    if is_pair and all(isinstance(n, int | float) and math.isfinite(n) for n in corner):  # type: ignore[attr-defined]
         return float(corner[0]), float(corner[1])  # type: ignore[index]
     raise SettingsError(f"the outline of '{name}' has a corner that is not two numbers: {corner!r}")

@@ -22,11 +22,11 @@ import cv2
 
 from visup.agent.model.errors import SourceError, VisupError
 from visup.teaching.clip_frames import ClipFrames
-from visup.teaching.lesson import Lesson
-from visup.teaching.page.requests import Answer, clip_facts, save, snap
+from visup.teaching.outline_teaching import TeachingResult
+from visup.teaching.page.requests import Response, clip_facts, save, snap
 
 HOST = "127.0.0.1"
-MOST_BODY = 1 << 22
+MAX_BODY_BYTES = 1 << 22
 """Bytes that are read of a request at most."""
 
 POLL_S = 0.05
@@ -52,7 +52,7 @@ class TeachingPage:
         frame: Number of the frame that is shown first.
 
     Attributes:
-        lesson: All that was stored through the page; None when nothing was.
+        result: All that was stored through the page; None when nothing was.
     """
 
     def __init__(self, frames: ClipFrames, models: Path, frame: int = 0) -> None:
@@ -62,7 +62,7 @@ class TeachingPage:
         self._lock, self._done = Lock(), Event()
         self._server = ThreadingHTTPServer((HOST, 0), partial(_Handler, self))
         self._server.daemon_threads = True
-        self.lesson: Lesson | None = None
+        self.result: TeachingResult | None = None
 
     @property
     def port(self) -> int:
@@ -110,12 +110,12 @@ class TeachingPage:
             raise SourceError(f"frame {number} cannot be shown")
         return data.tobytes()
 
-    def facts(self) -> Answer:
+    def facts(self) -> Response:
         """What the page shows at first."""
         with self._lock:
             return clip_facts(self._frames, self._first, self._models)
 
-    def asked(self, what: str, given: Mapping[str, Any]) -> Answer | None:
+    def handle(self, what: str, body: Mapping[str, Any]) -> Response | None:
         """The answer to something that the page asks for; None when there is nothing of that name.
 
         Raises:
@@ -123,19 +123,21 @@ class TeachingPage:
         """
         with self._lock:
             if what == "snap":
-                return snap(self._frames, given)
+                return snap(self._frames, body)
             if what == "save":
-                return self._save(given)
+                return self._save(body)
         if what == "done":
             self._done.set()
             return {}
         return None
 
-    def _save(self, given: Mapping[str, Any]) -> Answer:
-        new, old = save(self._frames, self._models, given), self.lesson
+    def _save(self, body: Mapping[str, Any]) -> Response:
+        new, old = save(self._frames, self._models, body), self.result
         views = (*(old.views if old else ()), *new.views)
-        self.lesson = Lesson(new.database, views, (*(old.told[:-1] if old else ()), *new.told))
-        return {"told": new.told}
+        self.result = TeachingResult(
+            new.database, views, (*(old.messages[:-1] if old else ()), *new.messages)
+        )
+        return {"messages": new.messages}
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -157,27 +159,27 @@ class _Handler(BaseHTTPRequestHandler):
             name, kind = _STATIC[path]
             self._send(files(__package__).joinpath(name).read_bytes(), kind)
         elif path == "clip.json":
-            self._answer(self._page.facts)
+            self._respond(self._page.facts)
         elif path.startswith("frame/") and path[6:].isdecimal() and len(path) < 16:
-            self._answer(lambda: self._page.picture(int(path[6:])))
+            self._respond(lambda: self._page.picture(int(path[6:])))
         else:
             self.send_error(HTTPStatus.NOT_FOUND)
 
     def do_POST(self) -> None:
         """What changes something; from the page only."""
         path = self._path()
-        given = None if path is None else self._body()
-        if path is not None and given is not None:
-            self._answer(lambda: self._page.asked(path, given))
+        body = None if path is None else self._body()
+        if path is not None and body is not None:
+            self._respond(lambda: self._page.handle(path, body))
 
     def _path(self) -> str | None:
         """What follows the token; None when the request was refused."""
-        own = {f"{name}:{self._page.port}" for name in (HOST, "localhost")}
+        own_hosts = {f"{name}:{self._page.port}" for name in (HOST, "localhost")}
         origin = self.headers.get("Origin")
-        foreign = origin is not None and origin.removeprefix("http://") not in own
+        foreign = origin is not None and origin.removeprefix("http://") not in own_hosts
         prefix = self._page.prefix
-        known = secrets.compare_digest(self.path[: len(prefix)].encode(), prefix.encode())
-        if self.headers.get("Host") not in own or foreign or not known:
+        has_token = secrets.compare_digest(self.path[: len(prefix)].encode(), prefix.encode())
+        if self.headers.get("Host") not in own_hosts or foreign or not has_token:
             self.send_error(HTTPStatus.FORBIDDEN)
             return None
         return self.path[len(prefix) :].partition("?")[0]
@@ -185,34 +187,34 @@ class _Handler(BaseHTTPRequestHandler):
     def _body(self) -> Mapping[str, Any] | None:
         length = self.headers.get("Content-Length", "")
         kind = self.headers.get("Content-Type", "").partition(";")[0]
-        if kind != "application/json" or not length.isdecimal() or int(length) > MOST_BODY:
+        if kind != "application/json" or not length.isdecimal() or int(length) > MAX_BODY_BYTES:
             self.send_error(HTTPStatus.BAD_REQUEST)
             return None
         try:
-            given = json.loads(self.rfile.read(int(length)))
+            body = json.loads(self.rfile.read(int(length)))
         except ValueError:
-            given = None
-        if not isinstance(given, Mapping):
+            body = None
+        if not isinstance(body, Mapping):
             self.send_error(HTTPStatus.BAD_REQUEST)
             return None
-        return given
+        return body
 
-    def _answer(self, answer: Callable[[], Answer | bytes | None]) -> None:
+    def _respond(self, answer: Callable[[], Response | bytes | None]) -> None:
         """Send an answer; errors that the user can fix are shown in the page."""
         try:
-            told = answer()
+            response = answer()
         except VisupError as e:
             self._send_json({"error": str(e)}, HTTPStatus.UNPROCESSABLE_ENTITY)
             return
-        if told is None:
+        if response is None:
             self.send_error(HTTPStatus.NOT_FOUND)
-        elif isinstance(told, bytes):
-            self._send(told, "image/jpeg")
+        elif isinstance(response, bytes):
+            self._send(response, "image/jpeg")
         else:
-            self._send_json(told)
+            self._send_json(response)
 
-    def _send_json(self, told: Answer, status: HTTPStatus = HTTPStatus.OK) -> None:
-        self._send(json.dumps(told).encode(), "application/json", status)
+    def _send_json(self, response: Response, status: HTTPStatus = HTTPStatus.OK) -> None:
+        self._send(json.dumps(response).encode(), "application/json", status)
 
     def _send(self, data: bytes, kind: str, status: HTTPStatus = HTTPStatus.OK) -> None:
         self.send_response(status)

@@ -36,14 +36,14 @@ class StoredRun:
         folder: Folder of the run.
         size: Bytes without evidence.
         written: When it was last written to, seconds since 1970.
-        goes_on: Whether it is active.
+        active: Whether it is active.
         evidence: Evidence of its alerts, oldest first.
     """
 
     folder: Path
     size: int
     written: float
-    goes_on: bool
+    active: bool
     evidence: tuple[StoredEvidence, ...] = ()
 
 
@@ -70,16 +70,16 @@ class StoredFiles:
         return self.evidence_size + sum(run.size for run in self.runs)
 
 
-def look_into(store: Path, going_on: Iterable[Path]) -> StoredFiles:
+def scan_store(store: Path, active_runs: Iterable[Path]) -> StoredFiles:
     """Scan a store; files that vanish meanwhile are left out.
 
     Args:
         store: Folder of all runs.
-        going_on: Folders of the active runs.
+        active_runs: Folders of the active runs.
     """
-    under_way = set(going_on)
+    active = set(active_runs)
     folders = sorted(p for p in store.glob("*/*") if is_run_name(p.name) and _is_plain_folder(p))
-    runs = tuple(_run(folder, goes_on=folder in under_way) for folder in folders)
+    runs = tuple(_run(folder, active=folder in active) for folder in folders)
     return StoredFiles(runs, shutil.disk_usage(store).free)
 
 
@@ -88,15 +88,17 @@ def _is_plain_folder(path: Path) -> bool:
     return path.is_dir() and not path.is_symlink()
 
 
-def _run(folder: Path, *, goes_on: bool) -> StoredRun:
-    own = [entries for p in folder.iterdir() if p.name != EVIDENCE for entries in _sizes([p])]
+def _run(folder: Path, *, active: bool) -> StoredRun:
+    run_files = [entries for p in folder.iterdir() if p.name != EVIDENCE for entries in _sizes([p])]
     evidence = folder / EVIDENCE
     alerts = tuple(_evidence(evidence)) if _is_plain_folder(evidence) else ()
     journal = folder / JOURNAL
-    written = max((at for _, at in own), default=max((e.written for e in alerts), default=0.0))
+    written = max(
+        (at for _, at in run_files), default=max((e.written for e in alerts), default=0.0)
+    )
     with suppress(OSError):
         written = written or journal.stat().st_mtime
-    return StoredRun(folder, sum(size for size, _ in own), written, goes_on, alerts)
+    return StoredRun(folder, sum(size for size, _ in run_files), written, active, alerts)
 
 
 def _evidence(folder: Path) -> Iterator[StoredEvidence]:

@@ -16,9 +16,9 @@ from tests.paths import SHARED
 from tests.teaching.clips import SIDE, SIZE, TOP, corners, frame, write_clip
 from visup.agent.model.errors import SettingsError, SourceError, VisupError
 from visup.percepts.shape.database.model_database import ModelDatabase
-from visup.teaching.briefs import read_showings
+from visup.teaching.briefs import read_clip_outlines
 from visup.teaching.clip_frames import ClipFrames
-from visup.teaching.lesson import teach_brief, views_of
+from visup.teaching.outline_teaching import teach_brief, views_of
 
 
 @pytest.fixture(scope="module")
@@ -97,13 +97,13 @@ def test_what_shows_nothing_is_refused_and_no_database_begun(
     assert not (tmp_path / "a.models").exists()
 
 
-def brief(tmp_path: Path, told: Any) -> Path:
+def brief(tmp_path: Path, content: Any) -> Path:
     for name in ("first", "second"):
         (tmp_path / name).mkdir(exist_ok=True)
         if not (tmp_path / name / "clip.mp4").exists():
             write_clip(tmp_path / name / "clip.avi", 3).rename(tmp_path / name / "clip.mp4")
     path = tmp_path / "second" / "brief.json"
-    path.write_text(told if isinstance(told, str) else json.dumps(told))
+    path.write_text(content if isinstance(content, str) else json.dumps(content))
     return path
 
 
@@ -112,22 +112,22 @@ def drawn(clip: str, number: int) -> dict[str, Any]:
 
 
 def test_a_brief_teaches_its_own_clip_first(tmp_path: Path) -> None:
-    told = {
+    content = {
         "teach": {"part": drawn("first", 0), "tray": drawn("first", 1)},
         "teach_own": {"part": drawn("second", 2)},
         "teach_extra": {"hand": drawn("second", 1)},
     }
-    path = brief(tmp_path, told)
+    path = brief(tmp_path, content)
     lesson = teach_brief(path.parent, tmp_path / "a.models")
     assert {v.name: v.bbox[0] for v in lesson.views} == {"part": 22, "tray": 21, "hand": 21}
     assert set(lesson.database.names()) == {"part", "tray", "hand"}
     again = teach_brief(path, tmp_path / "a.models")
-    assert "nothing was added" in again.told[-1]
+    assert "nothing was added" in again.messages[-1]
     assert len(again.database.taught) == 3
 
 
 @pytest.mark.parametrize(
-    ("told", "message"),
+    ("content", "message"),
     [
         ("{", "not JSON"),
         ("[]", "no mapping"),
@@ -138,8 +138,8 @@ def test_a_brief_teaches_its_own_clip_first(tmp_path: Path) -> None:
         ({"teach": {"part": drawn("third", 0)}}, "'third' is not there"),
     ],
 )
-def test_a_brief_that_is_none_is_refused(tmp_path: Path, told: Any, message: str) -> None:
-    path = brief(tmp_path, told)
+def test_a_brief_that_is_none_is_refused(tmp_path: Path, content: Any, message: str) -> None:
+    path = brief(tmp_path, content)
     with pytest.raises(SettingsError, match=message) as refused:
         teach_brief(path, tmp_path / "a.models")
     assert str(path) in str(refused.value)
@@ -152,18 +152,18 @@ def test_a_missing_brief_is_told(tmp_path: Path) -> None:
 
 def test_what_is_told_names_size_place_and_what_to_heed(clip: Path, tmp_path: Path) -> None:
     small = [(0, 0), (9, 0), (9, 9), (0, 9)]
-    told = {"teach": {"dot": {"clip": "first", "frame": 0, "polygon": small}}}
-    lesson = teach_brief(brief(tmp_path, told), tmp_path / "a.models")
-    assert "10 x 10 pixels at (0, 0), cut by the picture's border" in lesson.told[0]
-    assert "hard to find again" in lesson.told[0]
-    assert lesson.told[-1].endswith("has outlines of: dot (1 view).")
+    content = {"teach": {"dot": {"clip": "first", "frame": 0, "polygon": small}}}
+    lesson = teach_brief(brief(tmp_path, content), tmp_path / "a.models")
+    assert "10 x 10 pixels at (0, 0), cut by the picture's border" in lesson.messages[0]
+    assert "hard to find again" in lesson.messages[0]
+    assert lesson.messages[-1].endswith("has outlines of: dot (1 view).")
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the shared data is not there")
 def test_every_shared_brief_is_read_and_a_thing_is_taught_within_a_second(tmp_path: Path) -> None:
     briefs = sorted(SHARED.glob("*/*/brief.json"))
-    assert all(read_showings(path) for path in briefs)
-    views = views_of(read_showings(briefs[0]))
+    assert all(read_clip_outlines(path) for path in briefs)
+    views = views_of(read_clip_outlines(briefs[0]))
     database = ModelDatabase.open_or_new(tmp_path / "a.models")
     begun = time.process_time()
     database.teach(views)

@@ -12,9 +12,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.serving.fakes import Bench
-from visup.serving.room.housekeeper import SCAN_S, Housekeeper
-from visup.serving.room.retention import DAY_S, FRESH_S, SLACK, RemovalReason, removals
-from visup.serving.room.stored import StoredEvidence, StoredFiles, StoredRun, look_into
+from visup.serving.retention.housekeeper import SCAN_S, Housekeeper
+from visup.serving.retention.removals import (
+    DAY_S,
+    FREE_SPACE_FACTOR,
+    RECENT_S,
+    RemovalReason,
+    removals,
+)
+from visup.serving.retention.stored_files import StoredEvidence, StoredFiles, StoredRun, scan_store
 from visup.serving.site.records import RetentionLimits
 from visup.serving.site_log import SiteEvent
 
@@ -54,20 +60,20 @@ def test_what_goes_is_old_or_needed_and_no_run_that_goes_on(
     assert len({id(one.what) for one in gone}) == len(gone)
     runs = [one.what for one in gone if isinstance(one.what, StoredRun)]
     evidence = [e for run in files.runs for e in run.evidence]
-    assert not any(run.goes_on or NOW - run.written <= FRESH_S for run in runs)
+    assert not any(run.active or NOW - run.written <= RECENT_S for run in runs)
     left = files.size - sum(one.size for one in gone)
     free = files.free + sum(one.size for one in gone)
-    may_go = [r for r in files.runs if not r.goes_on and NOW - r.written > FRESH_S]
-    settled = [e for e in evidence if NOW - e.written > FRESH_S]
+    may_go = [r for r in files.runs if not r.active and NOW - r.written > RECENT_S]
+    settled = [e for e in evidence if NOW - e.written > RECENT_S]
     everything = len(gone) >= len(settled) + len(may_go)
     assert everything or free >= limits.free_bytes
     assert everything or limits.store_bytes is None or left <= limits.store_bytes
     for one in gone:
         days = limits.days if isinstance(one.what, StoredRun) else limits.evidence_days
-        assert (one.why is RemovalReason.AGE) == (NOW - one.what.written > DAY_S * days)
-    last = next((o for o in reversed(gone) if o.why is RemovalReason.DISK), None)
+        assert (one.reason is RemovalReason.AGE) == (NOW - one.what.written > DAY_S * days)
+    last = next((o for o in reversed(gone) if o.reason is RemovalReason.DISK), None)
     if last:  # without it there would not have been enough
-        assert free - last.size < SLACK * limits.free_bytes
+        assert free - last.size < FREE_SPACE_FACTOR * limits.free_bytes
 
 
 @given(stored())
@@ -113,7 +119,7 @@ def test_old_runs_go_and_their_alerts_keep_their_evidence_longer(
     notes = tmp_path / "cell" / "notes"
     notes.mkdir()
     house = keeper(tmp_path, bench, RetentionLimits(30.0, 180.0, None, 0.0))
-    house.look([])
+    house.scan([])
     assert not oldest.exists()
     assert [p.name for p in old.iterdir()] == ["evidence"]
     assert len(list((old / "evidence").iterdir())) == 6
@@ -131,15 +137,15 @@ def test_on_a_full_disk_the_oldest_evidence_goes_and_it_is_told(
     usage = SimpleNamespace(free=980)
     monkeypatch.setattr(shutil, "disk_usage", lambda path: usage)
     house = keeper(tmp_path, bench, RetentionLimits(30.0, 180.0, None, 1000.0))
-    house.look([first])
+    house.scan([first])
     assert list(first.rglob("*.webm")) == []
     assert len(list(second.rglob("*.webm"))) == 0  # a tenth more than the limit is freed
     assert (first / "journal.sqlite").exists()
     assert bench.kinds == [SiteEvent.NO_ROOM]
     assert "the disk was nearly full" in bench.lines[0]
     usage.free = 0
-    house.look([first])
-    house.look([first])
+    house.scan([first])
+    house.scan([first])
     assert not second.exists()
     assert (first / "journal.sqlite").exists()
     assert [line for line in bench.lines if "nothing more can be deleted" in line] == bench.lines[
@@ -155,7 +161,7 @@ def test_what_a_link_leads_to_is_not_touched(tmp_path: Path, bench: Bench) -> No
     inside = run(store, "20260102T000000Z", 900)
     (inside / "link").symlink_to(elsewhere)
     os.utime(inside / "link", (0.0, 0.0), follow_symlinks=False)
-    keeper(store, bench, RetentionLimits(1.0, 1.0, 1.0, 1e18)).look([])
+    keeper(store, bench, RetentionLimits(1.0, 1.0, 1.0, 1e18)).scan([])
     assert not inside.exists()
     assert len(list(elsewhere.rglob("*.*"))) == 4
 
@@ -163,9 +169,9 @@ def test_what_a_link_leads_to_is_not_touched(tmp_path: Path, bench: Bench) -> No
 def test_it_looks_once_in_a_while_and_never_twice_at_a_time(tmp_path: Path, bench: Bench) -> None:
     looks: list[float] = []
     house = keeper(tmp_path, bench, RetentionLimits())
-    house.look = lambda going_on: looks.append(1.0)  # type: ignore[method-assign]
+    house.scan = lambda active_runs: looks.append(1.0)  # type: ignore[method-assign]
     for second in range(25):
-        house.turn(float(second), [])
+        house.tick(float(second), [])
         if house._thread:
             house._thread.join()
     assert len(looks) == 1 + int(24 // SCAN_S)
@@ -174,7 +180,7 @@ def test_it_looks_once_in_a_while_and_never_twice_at_a_time(tmp_path: Path, benc
 def test_a_store_is_looked_into(tmp_path: Path) -> None:
     folder = run(tmp_path, "20260101T000000Z", 1, 1)
     (folder / "evidence" / ".alert-1.part.webm").write_bytes(b"x" * 5)
-    (one,) = look_into(tmp_path, [folder]).runs
-    assert (one.size, one.goes_on) == (100, True)
+    (one,) = scan_store(tmp_path, [folder]).runs
+    assert (one.size, one.active) == (100, True)
     (evidence,) = one.evidence
     assert (evidence.size, len(evidence.files)) == (35, 4)

@@ -16,11 +16,11 @@ from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.percepts.shape.database.taught_records import checked_name
 from visup.percepts.taught.taught_view import TaughtView, taught_view, taught_view_from_mask
 from visup.percepts.video.source import to_bgr
-from visup.teaching.briefs import Showing, read_showings
+from visup.teaching.briefs import ClipOutline, read_clip_outlines
 from visup.teaching.clip_frames import ClipFrames
 from visup.teaching.outlines import DrawnOutline
 
-SMALL = 16
+MIN_SIDE = 16
 """An object whose longer side has fewer pixels may be hard to recognise."""
 
 Corners = Sequence[Sequence[float]]
@@ -29,18 +29,18 @@ OutlineLike = Corners | NDArray[np.bool_] | NDArray[np.number]
 
 
 @dataclass(frozen=True, slots=True)
-class Lesson:
+class TeachingResult:
     """The result of teaching.
 
     Attributes:
         database: As it is now.
         views: The new views, in order.
-        told: A sentence or two about each, and one about the database.
+        messages: A sentence or two about each, and one about the database.
     """
 
     database: ModelDatabase
     views: tuple[TaughtView, ...]
-    told: tuple[str, ...]
+    messages: tuple[str, ...]
 
 
 def teach(
@@ -89,7 +89,7 @@ def teach(
 
 def teach_outlines(
     frames: ClipFrames, drawn: Sequence[tuple[int, DrawnOutline]], models: Path
-) -> Lesson:
+) -> TeachingResult:
     """Store outlines drawn in frames of a clip.
 
     Args:
@@ -107,16 +107,16 @@ def teach_outlines(
     return store(models, views)
 
 
-def teach_brief(brief: Path, models: Path) -> Lesson:
+def teach_brief(brief: Path, models: Path) -> TeachingResult:
     """Store all that a brief shows; see `briefs.py`.
 
     Raises:
         VisupError: As `teach`, or the brief is not as it should be.
     """
-    return store(models, views_of(read_showings(brief)))
+    return store(models, views_of(read_clip_outlines(brief)))
 
 
-def views_of(showings: Sequence[Showing]) -> list[TaughtView]:
+def views_of(showings: Sequence[ClipOutline]) -> list[TaughtView]:
     """The views that outlines in clips show, clip by clip.
 
     Raises:
@@ -124,15 +124,15 @@ def views_of(showings: Sequence[Showing]) -> list[TaughtView]:
     """
     views: dict[int, TaughtView] = {}
     for video in dict.fromkeys(s.video for s in showings):
-        own = [k for k, s in enumerate(showings) if s.video == video]
+        in_video = [k for k, s in enumerate(showings) if s.video == video]
         with ClipFrames(str(video)) as frames:
-            for k in sorted(own, key=lambda k: showings[k].frame):
-                shown = showings[k].outline
-                views[k] = taught_view(shown.name, frames.at(showings[k].frame), shown.corners)
+            for k in sorted(in_video, key=lambda k: showings[k].frame):
+                outline = showings[k].outline
+                views[k] = taught_view(outline.name, frames.at(showings[k].frame), outline.corners)
     return [views[k] for k in sorted(views)]
 
 
-def store(models: Path, views: Sequence[TaughtView]) -> Lesson:
+def store(models: Path, views: Sequence[TaughtView]) -> TeachingResult:
     """Add views to a database, all or nothing, and say so.
 
     Raises:
@@ -144,13 +144,13 @@ def store(models: Path, views: Sequence[TaughtView]) -> Lesson:
         checked_name(view.name)
     before = ModelDatabase.open_or_new(models)
     database = before.teach(views)
-    known = len(before.taught)
-    told = [_told(v) for v in views]
-    if len(database.taught) == known:
-        told.append(f"{models} already has all of this; nothing was added.")
+    view_count = len(before.taught)
+    messages = [_view_message(v) for v in views]
+    if len(database.taught) == view_count:
+        messages.append(f"{models} already has all of this; nothing was added.")
     else:
-        told.append(_summary(database))
-    return Lesson(database, tuple(views), tuple(told))
+        messages.append(_summary(database))
+    return TeachingResult(database, tuple(views), tuple(messages))
 
 
 def _view(name: str, picture: NDArray[np.uint8], drawn: OutlineLike) -> TaughtView:
@@ -166,14 +166,14 @@ def _view(name: str, picture: NDArray[np.uint8], drawn: OutlineLike) -> TaughtVi
     return taught_view(name, picture, drawn)
 
 
-def _told(view: TaughtView) -> str:
+def _view_message(view: TaughtView) -> str:
     x, y, width, height = view.bbox
-    told = f"{view.name}: {width} x {height} pixels at ({x}, {y})"
+    message = f"{view.name}: {width} x {height} pixels at ({x}, {y})"
     if min(x, y) == 0 or x + width == view.frame_size[0] or y + height == view.frame_size[1]:
-        told += ", cut by the picture's border"
-    if max(width, height) < SMALL:
-        told += "; an object this small may be hard to find again"
-    return told + "."
+        message += ", cut by the picture's border"
+    if max(width, height) < MIN_SIDE:
+        message += "; an object this small may be hard to find again"
+    return message + "."
 
 
 def _summary(database: ModelDatabase) -> str:

@@ -11,15 +11,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 
-from visup.serving.room.stored import StoredEvidence, StoredFiles, StoredRun
+from visup.serving.retention.stored_files import StoredEvidence, StoredFiles, StoredRun
 from visup.serving.site.records import RetentionLimits
 
 DAY_S = 86400.0
-FRESH_S = 120.0
+RECENT_S = 120.0
 """Runs written within this time are kept: they may have just begun or be closing. So is evidence, except by
 age: someone may still be looking at a recent alert."""
 
-SLACK = 1.1
+FREE_SPACE_FACTOR = 1.1
 """A full disk is freed beyond its limit by this factor, so that the next scan does not find it full again."""
 
 
@@ -37,11 +37,11 @@ class Removal:
 
     Attributes:
         what: A run without its evidence, or the evidence of an alert.
-        why: The rule.
+        reason: The rule.
     """
 
     what: StoredRun | StoredEvidence
-    why: RemovalReason
+    reason: RemovalReason
 
     @property
     def size(self) -> int:
@@ -57,42 +57,42 @@ def removals(files: StoredFiles, limits: RetentionLimits, now: float) -> tuple[R
         limits: The retention limits.
         now: Seconds since 1970.
     """
-    finished = (r for r in files.runs if not r.goes_on and r.size and now - r.written > FRESH_S)
+    finished = (r for r in files.runs if not r.active and r.size and now - r.written > RECENT_S)
     runs = sorted(finished, key=lambda r: r.written)
     evidence = sorted((e for r in files.runs for e in r.evidence), key=lambda e: e.written)
-    settled = [e for e in evidence if now - e.written > FRESH_S]
-    gone: list[Removal] = [
-        *_old(runs, now - DAY_S * limits.days),
-        *_old(evidence, now - DAY_S * limits.evidence_days),
+    old_evidence = [e for e in evidence if now - e.written > RECENT_S]
+    removed: list[Removal] = [
+        *_expired(runs, now - DAY_S * limits.days),
+        *_expired(evidence, now - DAY_S * limits.evidence_days),
     ]
     if limits.store_bytes is not None:
-        excess = files.size - limits.store_bytes - _freed(gone)
-        gone += _freeing(excess, [*runs, *settled], gone, RemovalReason.STORE)
-    free = files.free + _freed(gone)
-    short = SLACK * limits.free_bytes - free if free < limits.free_bytes else 0.0
-    gone += _freeing(short, [*settled, *runs], gone, RemovalReason.DISK)
-    return tuple(gone)
+        excess = files.size - limits.store_bytes - _freed_bytes(removed)
+        removed += _until_freed(excess, [*runs, *old_evidence], removed, RemovalReason.STORE)
+    free = files.free + _freed_bytes(removed)
+    missing = FREE_SPACE_FACTOR * limits.free_bytes - free if free < limits.free_bytes else 0.0
+    removed += _until_freed(missing, [*old_evidence, *runs], removed, RemovalReason.DISK)
+    return tuple(removed)
 
 
 Stored = StoredRun | StoredEvidence
 
 
-def _old(items: list[StoredRun] | list[StoredEvidence], before: float) -> Iterator[Removal]:
+def _expired(items: list[StoredRun] | list[StoredEvidence], before: float) -> Iterator[Removal]:
     yield from (Removal(item, RemovalReason.AGE) for item in items if item.written < before)
 
 
-def _freeing(
-    needed: float, items: list[Stored], gone: list[Removal], why: RemovalReason
+def _until_freed(
+    needed: float, items: list[Stored], removed: list[Removal], reason: RemovalReason
 ) -> Iterator[Removal]:
     """The first items that together free enough."""
-    already = {id(one.what) for one in gone}
+    removed_ids = {id(removal.what) for removal in removed}
     for item in items:
         if needed <= 0:
             return
-        if id(item) not in already:
+        if id(item) not in removed_ids:
             needed -= item.size
-            yield Removal(item, why)
+            yield Removal(item, reason)
 
 
-def _freed(gone: list[Removal]) -> int:
-    return sum(one.size for one in gone)
+def _freed_bytes(removed: list[Removal]) -> int:
+    return sum(removal.size for removal in removed)

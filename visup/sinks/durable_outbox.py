@@ -12,12 +12,12 @@ from visup.agent import AlertCondition
 from visup.sinks.delivery_log import DeliveryLog
 from visup.sinks.outbox import CLOSING_S, Sink, not_delivered, sink_fault
 
-FIRST_WAIT_S = 1.0
-LONGEST_WAIT_S = 30.0
-LOOK_S = 0.5
+INITIAL_WAIT_S = 1.0
+MAX_WAIT_S = 30.0
+POLL_S = 0.5
 
 
-class InsistentOutbox:
+class DurableOutbox:
     """Sends pending records to one sink, oldest first, in its own thread.
 
     A sink that is down is retried after 1 s, then 2, 4, ... up to 30. A record that it finally refuses is
@@ -42,9 +42,9 @@ class InsistentOutbox:
         self.delivered = self.dropped = self.failed = 0
         self.fault = ""
         self._log = log
-        self._unwritten: deque[Any] = deque(maxlen=1000)
+        self._unstored: deque[Any] = deque(maxlen=1000)
         self._new, self._closing = threading.Event(), threading.Event()
-        self._over = False
+        self._closed = False
         self._sent: int | None = None
         self._thread = threading.Thread(target=self._run, name=f"sink {sink.name}", daemon=True)
         self._thread.start()
@@ -55,20 +55,20 @@ class InsistentOutbox:
 
     def offer(self, record: Any) -> None:
         """Send a record that could not be stored, within this process; returns at once."""
-        self.dropped += len(self._unwritten) == self._unwritten.maxlen
-        self._unwritten.append(record)
+        self.dropped += len(self._unstored) == self._unstored.maxlen
+        self._unstored.append(record)
         self.wake()
 
-    def begin_closing(self) -> None:
+    def start_closing(self) -> None:
         """Send the pending records without further retries; returns at once."""
         self._closing.set()
         self._new.set()
 
     def close(self, wait_s: float = CLOSING_S) -> None:
         """Wait a last time for the sink; remaining records wait for the next process."""
-        self.begin_closing()
+        self.start_closing()
         self._thread.join(wait_s)
-        self._over = True
+        self._closed = True
 
     @property
     def note(self) -> str | None:
@@ -80,19 +80,19 @@ class InsistentOutbox:
         yield from sink_fault(self.sink.name, self.fault, self.dropped)
 
     def _run(self) -> None:
-        wait_s = FIRST_WAIT_S
-        while not self._over:
-            taken = self._send_oldest()
-            if taken:
-                wait_s = FIRST_WAIT_S
+        wait_s = INITIAL_WAIT_S
+        while not self._closed:
+            sent = self._send_oldest()
+            if sent:
+                wait_s = INITIAL_WAIT_S
             elif self._closing.is_set():
                 break
-            elif taken is None:
-                self._new.wait(LOOK_S)
+            elif sent is None:
+                self._new.wait(POLL_S)
                 self._new.clear()
             else:
                 self._closing.wait(wait_s)
-                wait_s = min(2.0 * wait_s, LONGEST_WAIT_S)
+                wait_s = min(2.0 * wait_s, MAX_WAIT_S)
         try:
             self.sink.close()
         except Exception as fault:
@@ -105,21 +105,21 @@ class InsistentOutbox:
         except (sqlite3.Error, ValueError) as fault:
             self.fault = f"{type(fault).__name__}: {fault}"
             found = None
-        if found is None and not self._unwritten:
+        if found is None and not self._unstored:
             return None
-        number, record = found or (None, self._unwritten[0])
+        number, record = found or (None, self._unstored[0])
         # A record that was sent but could not be removed is not sent again.
-        dealt_with = (number is not None and number == self._sent) or self._delivered(record)
-        if dealt_with and number is None:
-            self._unwritten.popleft()
-        elif dealt_with and number is not None:
+        finished = (number is not None and number == self._sent) or self._delivered(record)
+        if finished and number is None:
+            self._unstored.popleft()
+        elif finished and number is not None:
             self._sent = number
             try:
                 self._log.done(number)
             except sqlite3.Error as fault:
                 self.fault = f"{type(fault).__name__}: {fault}"
                 return False
-        return dealt_with
+        return finished
 
     def _delivered(self, record: Any) -> bool:
         """Whether the sink accepted a record, or finally refused it."""
