@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from tests.report.scene import frame_at, mind_at
 from visup.agent import Alert, Mind, Presence, Severity
-from visup.report.annotate import _intersect, _place, annotate, label_of
+from visup.report.annotate import _label_box, _overlap, annotate, label_of
 from visup.report.image_text import fitted, ink
 from visup.report.palette import OBJECT_COLOURS, object_colour
 
@@ -103,12 +103,12 @@ BOXES = st.tuples(
 def test_labels_stay_inside_and_apart(boxes: list[tuple[int, int, int, int]]) -> None:
     placed: list[tuple[int, int, int, int]] = []
     for box in boxes:
-        tag = _place(box, (120, 24), placed, (26, 454), 640)
+        tag = _label_box(box, (120, 24), placed, (26, 454), 640)
         assert tag[0] >= 0
         assert tag[0] + tag[2] <= 640
         assert tag[1] >= 26
         assert tag[1] + tag[3] <= 454
-        assert not any(_intersect(tag, other) for other in placed)
+        assert not any(_overlap(tag, other) for other in placed)
         placed.append(tag)
 
 

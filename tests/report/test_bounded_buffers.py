@@ -7,16 +7,16 @@ from functools import partial
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from visup.report.bounded_buffers import Heaviest, SpanRecorder, Thinned
+from visup.report.bounded_buffers import EvenSample, SpanRecorder, TopWeighted
 from visup.report.records import StateSpan
 
 
-@given(most=st.integers(2, 40), count=st.integers(0, 500))
+@given(max_items=st.integers(2, 40), count=st.integers(0, 500))
 @settings(max_examples=100, deadline=None)
 def test_a_thinned_stream_is_even_starts_at_its_start_and_never_overflows(
     most: int, count: int
 ) -> None:
-    kept = Thinned[int](most)
+    kept = EvenSample[int](most)
     made: list[int] = []
 
     def make(i: int) -> int:
@@ -37,13 +37,13 @@ def test_a_thinned_stream_is_even_starts_at_its_start_and_never_overflows(
 
 @given(
     weights=st.lists(st.integers(0, 5), max_size=60),
-    most=st.integers(1, 10),
+    max_items=st.integers(1, 10),
 )
 @settings(max_examples=100, deadline=None)
 def test_the_heaviest_stay_and_among_equals_the_earlier(weights: list[int], most: int) -> None:
-    kept = Heaviest[tuple[int, int]](most, lambda x: x[1])
+    kept = TopWeighted[tuple[int, int]](most, lambda x: x[1])
     for item in enumerate(weights):
-        if kept.has_room_for(item[1]):
+        if kept.would_keep(item[1]):
             kept.add(item)
     best = sorted(enumerate(weights), key=lambda x: (-x[1], x[0]))[:most]
     assert list(kept.items()) == sorted(best)
@@ -57,9 +57,9 @@ STATES = st.lists(
 @given(states=STATES)
 @settings(max_examples=100, deadline=None)
 def test_spans_say_at_each_moment_what_was_told(states: list[dict[str, str]]) -> None:
-    recorder = SpanRecorder(most=1000)
+    recorder = SpanRecorder(max_items=1000)
     for t, state in enumerate(states):
-        recorder.note(float(t), {(k,): v for k, v in state.items()})
+        recorder.record(float(t), {(k,): v for k, v in state.items()})
     spans = recorder.spans(float(len(states)))
     for t, state in enumerate(states):
         told = {s.subject[0]: s.value for s in spans if s.start <= t < s.end}
@@ -70,9 +70,9 @@ def test_spans_say_at_each_moment_what_was_told(states: list[dict[str, str]]) ->
 
 
 def test_spans_that_do_not_fit_are_dropped() -> None:
-    recorder = SpanRecorder(most=2)
+    recorder = SpanRecorder(max_items=2)
     for t in range(6):
-        recorder.note(t, {("x",): str(t)})
+        recorder.record(t, {("x",): str(t)})
     assert recorder.spans(6.0) == (
         StateSpan(("x",), "0", 0, 1),
         StateSpan(("x",), "1", 1, 2),
@@ -81,5 +81,5 @@ def test_spans_that_do_not_fit_are_dropped() -> None:
 
 
 def test_nothing_told_leaves_no_span() -> None:
-    assert SpanRecorder(most=2).spans(1.0) == ()
-    assert Thinned[int](2).items() == ()
+    assert SpanRecorder(max_items=2).spans(1.0) == ()
+    assert EvenSample[int](2).items() == ()

@@ -13,7 +13,7 @@ from tests.report.scene import END_S, FPS, TOLD, TOUCH_S, mind_at, run, step_at
 from visup.agent import Event, Relation, Severity, Truth, Verdict
 from visup.agent.model.errors import SettingsError
 from visup.report.collector import Collector, ReportLimits
-from visup.report.crops import cut_out, shrunk
+from visup.report.crops import object_crop, shrunk
 from visup.report.moments import sample_of, weight_of
 
 
@@ -36,7 +36,7 @@ def test_a_run_is_kept_whole_where_it_fits() -> None:
     assert [(s.id, s.name) for s in data.objects] == [(1, "spartan"), (2, "rms_arm")]
     assert len(data.samples) == data.frames
     assert data.tasks[0].verdict is Verdict.FAILED
-    assert {e.behaviour: (e.runs, e.mean_ms) for e in data.efforts} == {
+    assert {e.behaviour: (e.runs, e.mean_ms) for e in data.behaviour_costs} == {
         "motion": (61, 41.0),
         "shape": (31, 12.5),
     }
@@ -49,8 +49,8 @@ def test_key_frames_are_those_of_events_and_the_two_ends() -> None:
         image = cv2.imdecode(np.frombuffer(key.jpeg, np.uint8), cv2.IMREAD_COLOR)
         assert image is not None
         assert key.size == (image.shape[1], image.shape[0])
-    assert all(len(look.matches) == 5 for k in data.key_frames for look in k.looks)
-    for look in (look for k in data.key_frames for look in k.looks):
+    assert all(len(look.matches) == 5 for k in data.key_frames for look in k.closeups)
+    for look in (look for k in data.key_frames for look in k.closeups):
         similarities = [m.similarity for m in look.matches]
         assert similarities == sorted(similarities, reverse=True)
 
@@ -58,7 +58,7 @@ def test_key_frames_are_those_of_events_and_the_two_ends() -> None:
 def test_looks_name_the_time_at_which_the_matcher_looked() -> None:
     data = collected().finish()
     odd = next(k for k in data.key_frames if k.frame_index == 15)
-    assert odd.looks[0].matched_at == pytest.approx(14 / FPS)
+    assert odd.closeups[0].matched_at == pytest.approx(14 / FPS)
 
 
 def test_spans_follow_stages_moves_and_presence() -> None:
@@ -143,7 +143,7 @@ def test_cut_outs_fit_and_show_the_object(index: int) -> None:
     mind = mind_at(index)
     image = np.full((480, 640, 3), 200, np.uint8)
     for belief in mind.objects.values():
-        part = cut_out(image, belief)
+        part = object_crop(image, belief)
         assert max(part.shape[:2]) == 112
         _, _, w, h = belief.region.bbox
         assert math.isclose(part.shape[1] / part.shape[0], w / h, rel_tol=0.5)

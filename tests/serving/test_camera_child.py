@@ -57,7 +57,7 @@ def wait_for(what: Callable[[], object], seconds: float = 20.0) -> None:
         time.sleep(0.01)
 
 
-def test_a_job_is_read_as_it_was_written() -> None:
+def test_a_job_survives_serialisation() -> None:
     assert parse_job(job_line(JOB)) == JOB
 
 
@@ -78,11 +78,11 @@ def test_a_report_is_one_short_line(kind: ReportKind, data: dict[str, str]) -> N
 
 
 @given(st.binary(max_size=40))
-def test_what_is_no_report_is_none(line: bytes) -> None:
+def test_an_invalid_line_is_no_report(line: bytes) -> None:
     assert parse_report(line) is None
 
 
-def test_a_full_pipe_holds_up_nobody() -> None:
+def test_a_full_pipe_does_not_block_the_process() -> None:
     read, write = os.pipe()
     pipe = ReportPipe(write)
     for _ in range(1000):
@@ -92,7 +92,7 @@ def test_a_full_pipe_holds_up_nobody() -> None:
     os.close(write)
 
 
-def test_it_is_given_its_job_and_what_it_tells_is_heard() -> None:
+def test_a_child_receives_its_job_and_its_reports_are_read() -> None:
     one = child(
         "import os, sys, json\n"
         "job = json.loads(sys.stdin.readline())\n"
@@ -107,7 +107,7 @@ def test_it_is_given_its_job_and_what_it_tells_is_heard() -> None:
     assert one.exit_code() == 0
 
 
-def test_no_password_stands_in_the_list_of_processes() -> None:
+def test_no_password_appears_in_the_process_list() -> None:
     one = child("import sys; sum(range(10**7)); sys.stdin.read()")
     words = Path(f"/proc/{one.pid}/cmdline")
     if not words.exists():
@@ -126,7 +126,7 @@ def test_no_password_stands_in_the_list_of_processes() -> None:
     assert one.memory_mb() is None
 
 
-def test_it_can_be_asked_and_with_it_goes_what_it_began() -> None:
+def test_termination_also_ends_the_descendants_of_a_child() -> None:
     one = child(
         "import os, signal, subprocess, sys\n"
         "other = subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(100)'])\n"

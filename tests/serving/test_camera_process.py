@@ -42,7 +42,7 @@ def watched(job: CameraJob) -> tuple[int, list[CameraReport]]:
     return code, listener.heard()
 
 
-def test_a_file_is_watched_and_told_of(tmp_path: Path) -> None:
+def test_a_file_is_watched_and_its_outcome_reported(tmp_path: Path) -> None:
     clip = write_clip(tmp_path / "disc.avi", moving_disc(12))
     job = CameraJob(WatchSettings(str(clip)), OPTIONS, tmp_path / "run", resume=False)
     code, told = watched(job)
@@ -62,7 +62,7 @@ def test_a_file_is_watched_and_told_of(tmp_path: Path) -> None:
     assert Recording.open(tmp_path / "run").count() == 12
 
 
-def test_what_cannot_be_watched_leaves_no_folder_behind(tmp_path: Path) -> None:
+def test_a_refused_run_leaves_no_folder(tmp_path: Path) -> None:
     job = CameraJob(WatchSettings("none.avi"), OPTIONS, tmp_path / "run", resume=False)
     code, told = watched(job)
     assert code == 2
@@ -90,7 +90,7 @@ def read_by_a_new_process(run: Path) -> str:
     return told.stdout.strip()
 
 
-def test_it_ends_without_its_supervisor_and_the_next_goes_on(tmp_path: Path) -> None:
+def test_it_ends_without_its_supervisor_and_its_run_can_be_resumed(tmp_path: Path) -> None:
     from visup.serving.camera_child import CameraChild
 
     clip = write_clip(tmp_path / "disc.avi", moving_disc(40), fps=20.0)

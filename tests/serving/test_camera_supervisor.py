@@ -19,7 +19,7 @@ ENDED, REFUSED = ReportKind.ENDED, ReportKind.REFUSED
 
 
 @given(st.lists(st.floats(0.0, 2 * HEALTHY_S), min_size=1, max_size=60))
-def test_waits_grow_up_to_a_bound_and_are_short_again_after_calm(ran: list[float]) -> None:
+def test_waits_grow_up_to_a_limit_and_are_reset_after_a_healthy_run(ran: list[float]) -> None:
     backoff, last = Backoff(), 0.0
     for ran_s in ran:
         backoff = backoff.after(ran_s)
@@ -58,7 +58,7 @@ def cell(tmp_path: Path) -> Cell:
     return made
 
 
-def test_it_is_begun_at_once_and_watched_from_its_first_step(cell: Cell) -> None:
+def test_a_camera_starts_at_once_and_is_watched_from_its_first_step(cell: Cell) -> None:
     states = [cell.state]
     assert not cell.bench.last.job.resume
     cell.step()
@@ -66,7 +66,7 @@ def test_it_is_begun_at_once_and_watched_from_its_first_step(cell: Cell) -> None
     assert states == [CameraState.STARTING, CameraState.WATCHING]
 
 
-def test_a_process_that_dies_goes_on_with_its_run(cell: Cell) -> None:
+def test_a_process_that_died_resumes_its_run(cell: Cell) -> None:
     cell.step()
     cell.bench.last.code = -9
     cell.tick(5.0)
@@ -84,7 +84,7 @@ def test_a_process_that_dies_goes_on_with_its_run(cell: Cell) -> None:
 @pytest.mark.parametrize(
     ("stepped", "away", "most"), [(False, False, 30.0), (True, False, 10.0), (True, True, 30.0)]
 )
-def test_a_process_that_hangs_is_ended(cell: Cell, stepped: bool, away: bool, most: float) -> None:
+def test_a_hanging_process_is_killed(cell: Cell, stepped: bool, away: bool, most: float) -> None:
     """A camera that dropped is tried again for its patience, in which no step can be."""
     if stepped:
         cell.step()
@@ -99,7 +99,7 @@ def test_a_process_that_hangs_is_ended(cell: Cell, stepped: bool, away: bool, mo
     assert cell.state is CameraState.WAITING
 
 
-def test_a_sign_of_life_is_enough(cell: Cell) -> None:
+def test_any_report_counts_as_a_sign_of_life(cell: Cell) -> None:
     for _ in range(20):
         cell.step()
         cell.tick(9.0)
@@ -107,7 +107,7 @@ def test_a_sign_of_life_is_enough(cell: Cell) -> None:
     assert cell.bench.running
 
 
-def test_a_process_that_swells_closes_and_goes_on_smaller(cell: Cell) -> None:
+def test_a_process_that_uses_too_much_memory_is_restarted(cell: Cell) -> None:
     cell.step()
     cell.bench.last.memory = 1000.1
     cell.tick(1.0)
@@ -119,7 +119,7 @@ def test_a_process_that_swells_closes_and_goes_on_smaller(cell: Cell) -> None:
     assert any("1000 MB in use, 1000 allowed" in line for line in cell.bench.lines)
 
 
-def test_a_state_that_ends_every_process_is_left(cell: Cell) -> None:
+def test_a_run_whose_state_crashes_every_process_is_abandoned(cell: Cell) -> None:
     cell.step()
     first = cell.bench.last.job.folder
     resumed = []
@@ -133,7 +133,7 @@ def test_a_state_that_ends_every_process_is_left(cell: Cell) -> None:
 
 
 @pytest.mark.parametrize(("because_of_the_source", "goes_on"), [(True, True), (False, False)])
-def test_a_run_that_is_refused_is_left_but_not_for_a_camera_that_is_away(
+def test_a_refused_run_is_abandoned_unless_its_camera_is_unreachable(
     cell: Cell, because_of_the_source: bool, goes_on: bool
 ) -> None:
     cell.step()
@@ -150,7 +150,7 @@ def test_a_run_that_is_refused_is_left_but_not_for_a_camera_that_is_away(
 @pytest.mark.parametrize(
     ("live", "state"), [(False, CameraState.OVER), (True, CameraState.WAITING)]
 )
-def test_a_file_is_seen_once_and_a_camera_for_ever(
+def test_a_file_is_watched_once_and_a_camera_without_end(
     cell: Cell, live: bool, state: CameraState
 ) -> None:
     cell.step()
@@ -161,7 +161,7 @@ def test_a_file_is_seen_once_and_a_camera_for_ever(
     assert "verdict none after 7 frames" in cell.bench.lines[-1]
 
 
-def test_what_the_service_stopped_itself_is_not_said_to_be_stopped_by_the_user(cell: Cell) -> None:
+def test_a_stop_by_the_service_is_not_reported_as_one_by_the_user(cell: Cell) -> None:
     cell.step()
     cell.supervisor.stop(cell.now)
     problem = {"problem": "stopped by the user", "stopped": True}
@@ -172,7 +172,7 @@ def test_what_the_service_stopped_itself_is_not_said_to_be_stopped_by_the_user(c
 
 
 @pytest.mark.parametrize("stubborn", [False, True])
-def test_a_stop_takes_no_longer_than_it_may(cell: Cell, stubborn: bool) -> None:
+def test_a_stop_takes_limited_time(cell: Cell, stubborn: bool) -> None:
     cell.step()
     cell.bench.last.stubborn = stubborn
     cell.supervisor.stop(cell.now)
@@ -185,7 +185,7 @@ def test_a_stop_takes_no_longer_than_it_may(cell: Cell, stubborn: bool) -> None:
     assert cell.bench.last.closed
 
 
-def test_other_settings_are_taken_up_after_a_good_end(cell: Cell) -> None:
+def test_changed_settings_apply_after_a_clean_end(cell: Cell) -> None:
     cell.step()
     cell.supervisor.replace(site_camera(source="1", fingerprint="b"), cell.now)
     cell.tick(0.1)
@@ -196,7 +196,7 @@ def test_other_settings_are_taken_up_after_a_good_end(cell: Cell) -> None:
     assert not second.job.resume
 
 
-def test_another_sink_is_taken_up_with_all_that_is_believed(cell: Cell) -> None:
+def test_a_changed_sink_applies_and_beliefs_are_kept(cell: Cell) -> None:
     cell.step()
     cell.supervisor.replace(site_camera(source="1", fingerprint="a"), cell.now)
     cell.tick(0.1)
@@ -204,7 +204,7 @@ def test_another_sink_is_taken_up_with_all_that_is_believed(cell: Cell) -> None:
     assert cell.bench.last.job.resume
 
 
-def test_a_store_that_cannot_be_written_is_tried_again(tmp_path: Path) -> None:
+def test_an_unwritable_store_is_retried(tmp_path: Path) -> None:
     (tmp_path / "store").write_text("no folder")
     cell = Cell(tmp_path / "store")
     cell.tick()
@@ -223,7 +223,7 @@ COUNT = itertools.count()
 
 @settings(max_examples=30)
 @given(acts=st.lists(ACTS, max_size=30))
-def test_whatever_happens_there_is_one_process_and_it_can_be_stopped(
+def test_there_is_always_at_most_one_process_and_it_can_be_stopped(
     tmp_path_factory: pytest.TempPathFactory, acts: list[str]
 ) -> None:
     cell = Cell(tmp_path_factory.mktemp("store") / str(next(COUNT)))

@@ -61,7 +61,7 @@ def scene(tmp_path: Path) -> Scene:
     return Scene(tmp_path)
 
 
-def test_it_is_begun_again_ever_more_seldom_and_no_camera_notices(scene: Scene) -> None:
+def test_it_is_restarted_with_growing_waits_and_no_camera_is_affected(scene: Scene) -> None:
     scene.tick()
     scene.tick()
     assert len(scene.begun) == 1
@@ -81,7 +81,7 @@ def test_it_is_begun_again_ever_more_seldom_and_no_camera_notices(scene: Scene) 
     assert all(process.poll() is not None for process in scene.begun)
 
 
-def test_what_changed_in_the_site_file_is_taken_up(scene: Scene) -> None:
+def test_changes_of_the_site_file_apply_to_the_console(scene: Scene) -> None:
     scene.tick()
     changed = replace(scene.site, console=replace(CONSOLE, listen=("127.0.0.1", 8087)))
     scene.supervisor.reload(changed, scene.now)
@@ -96,7 +96,7 @@ def test_what_changed_in_the_site_file_is_taken_up(scene: Scene) -> None:
     assert len(scene.begun) == 2
 
 
-def test_one_that_cannot_be_begun_stops_nothing(tmp_path: Path) -> None:
+def test_a_console_that_cannot_start_stops_nothing(tmp_path: Path) -> None:
     scene = Scene(tmp_path)
 
     def fail(command: Sequence[str], tokens: Mapping[str, str]) -> subprocess.Popen[bytes]:
@@ -107,7 +107,7 @@ def test_one_that_cannot_be_begun_stops_nothing(tmp_path: Path) -> None:
     assert "cannot be started (Cannot allocate memory)" in scene.bench.lines[-1]
 
 
-def test_tokens_are_no_part_of_the_command_or_of_what_is_told(scene: Scene) -> None:
+def test_tokens_appear_neither_in_the_command_nor_in_the_log(scene: Scene) -> None:
     console = replace(CONSOLE, names=("cell.example",), save_to=Path("own"))
     command = console_command(console, Path("store"))
     assert command[-6:] == ("--port", "8086", "--name", "cell.example", "--save-to", "own")
@@ -119,7 +119,7 @@ def test_tokens_are_no_part_of_the_command_or_of_what_is_told(scene: Scene) -> N
         assert token not in "".join(scene.bench.lines)
 
 
-def test_the_real_one_answers_and_ends_when_its_service_is_gone(tmp_path: Path) -> None:
+def test_a_real_console_answers_and_ends_with_its_service(tmp_path: Path) -> None:
     pytest.importorskip("nicegui", reason="needs the extra `console`")
     record(tmp_path / "cell" / "one", meeting(5))
     with socket.socket() as free:

@@ -30,7 +30,7 @@ def test_the_service_manager_waits_longer_than_the_service_needs() -> None:
     assert told["ExecStart"] == "/opt/visup/bin/visup serve /etc/visup/site.toml"
 
 
-def test_what_is_kept_lies_where_the_service_may_write() -> None:
+def test_stored_files_are_where_the_service_may_write() -> None:
     text = (DEPLOY / "visup-serve.service").read_text(encoding="utf-8")
     assert "VISUP_STATE_KEY=/var/lib/visup/" in text
     assert "StateDirectory=visup" in text
@@ -41,7 +41,7 @@ def test_what_is_kept_lies_where_the_service_may_write() -> None:
     assert all(Path(volume) in Path(path).parents for path in kept)
 
 
-def test_the_image_installs_extras_that_there_are() -> None:
+def test_the_image_installs_existing_extras() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     image = (DEPLOY / "Dockerfile").read_text(encoding="utf-8")
     (extras,) = re.findall(r"pip install .*'\.\[([\w,]+)\]'", image)

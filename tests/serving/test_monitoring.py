@@ -26,7 +26,7 @@ LIVES = st.lists(st.lists(st.integers(0, 1000), max_size=5).map(sorted), max_siz
 
 
 @given(LIVES)
-def test_sums_over_processes_never_go_back(lives: list[list[int]]) -> None:
+def test_totals_over_processes_never_decrease(lives: list[list[int]]) -> None:
     figures, last = CameraFigures(), 0.0
     for life in lives:
         for count in life:
@@ -39,7 +39,7 @@ def test_sums_over_processes_never_go_back(lives: list[list[int]]) -> None:
     assert last == sum(max(life, default=0) for life in lives)
 
 
-def test_what_a_process_tells_is_seen_from_outside(tmp_path: Path) -> None:
+def test_reports_of_a_process_appear_in_the_metrics(tmp_path: Path) -> None:
     bench = Bench()
     one = CameraSupervisor(site_camera(), tmp_path, bench.tell, bench.start)
     one.tick(0.0)
@@ -72,7 +72,7 @@ CELL = CameraStatus(
 )
 
 
-def test_the_page_is_what_prometheus_reads() -> None:
+def test_prometheus_can_parse_the_metrics() -> None:
     parser = pytest.importorskip("prometheus_client.parser", reason="needs the extra `serve`")
     page, kind = metrics_page(site(CELL, CameraStatus("yard", "starting")), "")
     assert kind.startswith("text/plain")
@@ -107,7 +107,7 @@ def server() -> Iterator[MonitoringServer]:
     made.close()
 
 
-def test_ready_is_who_watches_and_healthy_who_looked_a_moment_ago(server: MonitoringServer) -> None:
+def test_ready_means_watching_and_healthy_means_recently_updated(server: MonitoringServer) -> None:
     server.status = site(CELL, CameraStatus("yard", "starting"))
     assert server.answer("/healthz")[0] == 200
     status, body, _ = server.answer("/readyz")
@@ -130,7 +130,9 @@ def asked(server: MonitoringServer, path: str, method: str = "GET") -> tuple[int
             return refused.code, refused.read()
 
 
-def test_it_answers_while_others_hang_and_knows_no_other_address(server: MonitoringServer) -> None:
+def test_it_answers_while_other_clients_hang_and_serves_no_other_path(
+    server: MonitoringServer,
+) -> None:
     host, port = server.address.split(":")
     hanging = [socket.create_connection((host, int(port))) for _ in range(3)]
     assert asked(server, "/healthz?x=1")[0] == 200
@@ -142,7 +144,7 @@ def test_it_answers_while_others_hang_and_knows_no_other_address(server: Monitor
         one.close()
 
 
-def test_an_address_in_use_is_told(server: MonitoringServer) -> None:
+def test_an_address_in_use_is_reported(server: MonitoringServer) -> None:
     host, port = server.address.split(":")
     with pytest.raises(OutputError, match="nobody can be told") as told:
         MonitoringServer(host, int(port))

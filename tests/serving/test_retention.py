@@ -53,7 +53,7 @@ LIMITS = st.builds(
 
 
 @given(stored(), LIMITS)
-def test_what_goes_is_old_or_needed_and_no_run_that_goes_on(
+def test_only_old_or_excess_files_are_removed_and_no_active_run(
     files: StoredFiles, limits: RetentionLimits
 ) -> None:
     gone = removals(files, limits, NOW)
@@ -110,7 +110,7 @@ def keeper(store: Path, bench: Bench, limits: RetentionLimits) -> Housekeeper:
     return Housekeeper(store, limits, bench.tell, now=lambda: NOW)
 
 
-def test_old_runs_go_and_their_alerts_keep_their_evidence_longer(
+def test_old_runs_are_removed_before_the_evidence_of_their_alerts(
     tmp_path: Path, bench: Bench
 ) -> None:
     oldest = run(tmp_path, "20260101T000000Z", 200, 1)
@@ -130,7 +130,7 @@ def test_old_runs_go_and_their_alerts_keep_their_evidence_longer(
     assert "2 runs" in bench.lines[0]
 
 
-def test_on_a_full_disk_the_oldest_evidence_goes_and_it_is_told(
+def test_on_a_full_disk_the_oldest_evidence_is_removed_and_reported(
     tmp_path: Path, bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first, second = (run(tmp_path, f"2026010{n}T000000Z", 5 - n, 1, 2) for n in (1, 2))
@@ -153,7 +153,7 @@ def test_on_a_full_disk_the_oldest_evidence_goes_and_it_is_told(
     ]
 
 
-def test_what_a_link_leads_to_is_not_touched(tmp_path: Path, bench: Bench) -> None:
+def test_targets_of_links_are_not_removed(tmp_path: Path, bench: Bench) -> None:
     elsewhere = run(tmp_path / "other", "20260101T000000Z", 900, 1)
     store = tmp_path / "store"
     (store / "cell").mkdir(parents=True)
@@ -166,7 +166,7 @@ def test_what_a_link_leads_to_is_not_touched(tmp_path: Path, bench: Bench) -> No
     assert len(list(elsewhere.rglob("*.*"))) == 4
 
 
-def test_it_looks_once_in_a_while_and_never_twice_at_a_time(tmp_path: Path, bench: Bench) -> None:
+def test_scans_are_periodic_and_never_concurrent(tmp_path: Path, bench: Bench) -> None:
     looks: list[float] = []
     house = keeper(tmp_path, bench, RetentionLimits())
     house.scan = lambda active_runs: looks.append(1.0)  # type: ignore[method-assign]
@@ -177,7 +177,7 @@ def test_it_looks_once_in_a_while_and_never_twice_at_a_time(tmp_path: Path, benc
     assert len(looks) == 1 + int(24 // SCAN_S)
 
 
-def test_a_store_is_looked_into(tmp_path: Path) -> None:
+def test_a_store_is_scanned(tmp_path: Path) -> None:
     folder = run(tmp_path, "20260101T000000Z", 1, 1)
     (folder / "evidence" / ".alert-1.part.webm").write_bytes(b"x" * 5)
     (one,) = scan_store(tmp_path, [folder]).runs

@@ -16,7 +16,7 @@ from visup.serving.run_store import CURRENT, begin_run, resumable_run
 NOON = datetime(2026, 11, 23, 12, 0, 5, tzinfo=UTC)
 
 
-def test_a_run_that_was_begun_goes_on_under_the_same_settings_alone(tmp_path: Path) -> None:
+def test_a_run_is_resumed_only_under_the_same_settings(tmp_path: Path) -> None:
     folder = tmp_path / "store" / "cell"
     assert resumable_run(folder, "a") is None
     run = begin_run(folder, "a", NOON)
@@ -27,7 +27,7 @@ def test_a_run_that_was_begun_goes_on_under_the_same_settings_alone(tmp_path: Pa
     assert resumable_run(folder, "b") is None
 
 
-def test_a_run_whose_source_was_seen_to_the_end_does_not_go_on(tmp_path: Path) -> None:
+def test_a_complete_run_is_not_resumed(tmp_path: Path) -> None:
     run = begin_run(tmp_path, "a", NOON)
     run.mkdir()
     journal = Journal(run / JOURNAL)
@@ -38,7 +38,7 @@ def test_a_run_whose_source_was_seen_to_the_end_does_not_go_on(tmp_path: Path) -
     assert resumable_run(tmp_path, "a") is None
 
 
-def test_names_are_in_utc_and_no_two_runs_have_the_same(tmp_path: Path) -> None:
+def test_names_are_in_utc_and_unique(tmp_path: Path) -> None:
     berlin = NOON.astimezone(timezone(timedelta(hours=1)))
     runs = []
     for _ in range(3):
@@ -55,21 +55,21 @@ def test_names_are_in_utc_and_no_two_runs_have_the_same(tmp_path: Path) -> None:
     "text",
     ["", "[]", "{}", "no", '{"run": "../elsewhere", "fingerprint": "a"}', '{"run": 3}'],
 )
-def test_a_note_that_makes_no_sense_is_none(tmp_path: Path, text: str) -> None:
+def test_an_invalid_note_is_ignored(tmp_path: Path, text: str) -> None:
     (tmp_path / "cell").mkdir()
     begun_journal(tmp_path / "elsewhere")
     (tmp_path / "cell" / CURRENT).write_text(text)
     assert resumable_run(tmp_path / "cell", "a") is None
 
 
-def test_a_damaged_journal_does_not_go_on(tmp_path: Path) -> None:
+def test_a_run_with_a_damaged_journal_is_not_resumed(tmp_path: Path) -> None:
     run = begin_run(tmp_path, "a", NOON)
     run.mkdir()
     (run / JOURNAL).write_bytes(b"no journal")
     assert resumable_run(tmp_path, "a") is None
 
 
-def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path) -> None:
+def test_an_unwritable_folder_is_reported(tmp_path: Path) -> None:
     (tmp_path / "cell").write_text("a file")
     with pytest.raises(OutputError, match="folder of a camera"):
         begin_run(tmp_path / "cell", "a", NOON)

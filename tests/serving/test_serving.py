@@ -108,7 +108,7 @@ def serving(site: Path, *words: str) -> Iterator[Service]:
         process.wait()
 
 
-def test_who_is_killed_comes_back_and_the_others_never_notice(visup: Call, site: Path) -> None:
+def test_a_killed_camera_comes_back_and_the_others_are_unaffected(visup: Call, site: Path) -> None:
     with serving(site) as service:
         service.wait_for(lambda: service.has_states("one", "two"))
         victim, other = service.pid_of("one"), service.pid_of("two")

@@ -30,7 +30,7 @@ def site(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_site_that_can_be_watched(visup: Call, site: Path) -> None:
+def test_a_valid_site_passes_the_check(visup: Call, site: Path) -> None:
     done = visup("serve", "check", site)
     assert done.code == 0
     assert "camera cell" in done.out
@@ -40,7 +40,7 @@ def test_a_site_that_can_be_watched(visup: Call, site: Path) -> None:
     assert not (site.parent / "visup-runs").exists()
 
 
-def test_every_camera_is_looked_at_though_one_cannot_be_watched(visup: Call, site: Path) -> None:
+def test_every_camera_is_checked_even_if_one_cannot_be_watched(visup: Call, site: Path) -> None:
     more = '[[camera]]\nname = "gone"\nsource = "none.avi"\n'
     blind = '[[camera]]\nname = "blind"\nsource = "clip.avi"\ntasks = ["dock"]\n'
     sunk = '[[camera]]\nname = "sunk"\nsource = "clip.avi"\nsinks = ["pigeon:loft"]\n'
@@ -84,7 +84,7 @@ RATES = st.tuples(st.floats(2.0, 100.0), st.floats(0.5, 60.0))
 
 
 @given(st.lists(RATES, min_size=1, max_size=5), st.integers(1, 8))
-def test_whoever_follows_the_advice_has_room(
+def test_the_suggested_paces_fit_the_machine(
     rates: list[tuple[float, float]], processors: int
 ) -> None:
     checks = [checked(f"c{i}", *rate) for i, rate in enumerate(rates)]
@@ -101,7 +101,7 @@ def test_whoever_follows_the_advice_has_room(
         assert all(pace <= max(0.5, wanted) for pace, (_, wanted) in zip(paces, rates, strict=True))
 
 
-def test_what_could_not_be_measured_is_not_added_up() -> None:
+def test_unmeasured_cameras_are_left_out_of_the_total() -> None:
     fault = SettingsError("no")
     limits = ProcessLimits(1000.0, 10.0, 10.0)
     one = SiteCamera("a", WatchSettings(source="0"), RunOptions(), limits, "")

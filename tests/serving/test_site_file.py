@@ -101,7 +101,7 @@ sinks = ["webhook:https://example.org/hook", "file:alerts.jsonl"]
         ("rtsp://guard:${file:word.txt}@cell/1", "rtsp://guard:marlin@cell/1"),
     ],
 )
-def test_a_source_is_what_it_says(tmp_path: Path, written_as: str, read_as: str) -> None:
+def test_sources_are_parsed(tmp_path: Path, written_as: str, read_as: str) -> None:
     (tmp_path / "word.txt").write_text("marlin\n")
     text = ONE.replace("clip.avi", written_as)
     found = camera(tmp_path, text, PASSWORD="swordfish").settings.source
@@ -137,30 +137,32 @@ def test_a_source_is_what_it_says(tmp_path: Path, written_as: str, read_as: str)
         (ONE.replace("clip.avi", "rtsp://${a b}/"), 1, "cannot be replaced"),
     ],
 )
-def test_a_mistake_is_told_with_its_line(tmp_path: Path, text: str, line: int, told: str) -> None:
+def test_a_mistake_is_reported_with_its_line(
+    tmp_path: Path, text: str, line: int, told: str
+) -> None:
     (fault,) = faults(tmp_path, text)
     assert isinstance(fault.where, SourceLocation)
     assert fault.where.line == line
     assert told in str(fault)
 
 
-def test_all_mistakes_are_told_at_once_in_their_order(tmp_path: Path) -> None:
+def test_all_mistakes_are_reported_together_in_order(tmp_path: Path) -> None:
     found = faults(tmp_path, "stor = 1\n[limits]\nmemory_mb = 'x'\n[[camera]]\nsource = 3\n")
     lines = [f.where.line for f in found if isinstance(f.where, SourceLocation)]
     assert lines == [1, 3, 4, 5]
 
 
 @pytest.mark.parametrize("text", ["", 'store = "x"', "camera = []"])
-def test_a_site_has_a_camera(tmp_path: Path, text: str) -> None:
+def test_a_site_needs_a_camera(tmp_path: Path, text: str) -> None:
     assert '[[camera]], name = "cell"' in str(faults(tmp_path, text)[0])
 
 
-def test_a_file_that_is_not_there_is_told(tmp_path: Path) -> None:
+def test_a_missing_file_is_reported(tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match="cannot be read"):
         read_site(tmp_path / "none.toml")
 
 
-def test_beliefs_hang_on_files_too_but_on_no_password(tmp_path: Path) -> None:
+def test_the_fingerprint_covers_files_but_no_password(tmp_path: Path) -> None:
     (tmp_path / "own.rules").write_text("one")
     text = ONE.replace("clip.avi", "rtsp://guard:${WORD}@cell/1") + 'rules = ["own.rules"]\n'
     first = camera(tmp_path, text, WORD="marlin")
@@ -186,7 +188,7 @@ def test_keys_of_webhooks_come_from_the_environment(tmp_path: Path) -> None:
     assert "has no variable" in str(fault)
 
 
-def test_the_console_has_its_tokens_from_the_environment(tmp_path: Path) -> None:
+def test_tokens_of_the_console_come_from_the_environment(tmp_path: Path) -> None:
     (tmp_path / "own").mkdir()
     head = (
         '[console]\nlisten = "0.0.0.0:8086"\ntoken = "${TOKEN}"\nnames = ["cell.example"]\n'
@@ -210,7 +212,7 @@ def test_the_schema_knows_every_key_of_a_camera() -> None:
     assert form["$defs"]["CameraTable"]["required"] == ["name", "source"]
 
 
-def test_the_page_has_every_key_and_its_example_is_a_site(tmp_path: Path) -> None:
+def test_the_documentation_has_every_key_and_a_valid_example(tmp_path: Path) -> None:
     page = ROOT / "docs" / "serving.md"
     text = page.read_text(encoding="utf-8")
     given = [kind.annotation for kind in SiteTable.model_fields.values()]

@@ -27,7 +27,7 @@ def site(store: Path, *cameras: SiteCamera) -> Site:
     return Site(store / "site.toml", store, cameras)
 
 
-def test_only_who_changed_is_touched(tmp_path: Path) -> None:
+def test_only_changed_cameras_are_restarted(tmp_path: Path) -> None:
     bench = Bench()
     same, changed, gone = (site_camera(name) for name in ("same", "changed", "gone"))
     supervisor = SiteSupervisor(site(tmp_path, same, changed, gone), bench.tell, bench.start)
@@ -82,7 +82,7 @@ class Script:
         return WaitingClock(lambda: self.now, self.wait)
 
 
-def test_files_are_seen_to_their_end_and_the_log_can_be_json(tmp_path: Path) -> None:
+def test_files_are_watched_to_their_end_and_the_log_can_be_json(tmp_path: Path) -> None:
     clip = write_clip(tmp_path / "one.avi", moving_disc(40), fps=20.0)
     lines: list[str] = []
     one = site_camera("one", source=str(clip))
@@ -104,7 +104,7 @@ def test_files_are_seen_to_their_end_and_the_log_can_be_json(tmp_path: Path) -> 
     assert told[0]["run"] == next((tmp_path / "one").glob("2*")).name
 
 
-def test_a_stop_ends_all_and_is_told_the_service_manager(
+def test_a_stop_ends_all_cameras_and_notifies_the_service_manager(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     bench, stop = Bench(), StopRequest()
@@ -134,7 +134,7 @@ def test_a_stop_ends_all_and_is_told_the_service_manager(
     assert all(c.closed for c in bench.children)
 
 
-def test_a_process_that_does_not_close_is_told_by_the_exit_code(tmp_path: Path) -> None:
+def test_a_process_that_does_not_close_sets_the_exit_code(tmp_path: Path) -> None:
     bench, stop = Bench(), StopRequest(received=True)
     script = Script(lambda: setattr(bench.last, "stubborn", True))
 
@@ -153,7 +153,7 @@ def test_a_process_that_does_not_close_is_told_by_the_exit_code(tmp_path: Path) 
     assert code is ExitCode.NOT_RECORDED
 
 
-def test_a_service_whose_sources_are_all_seen_is_over(tmp_path: Path) -> None:
+def test_a_service_ends_when_all_sources_have_ended(tmp_path: Path) -> None:
     bench = Bench()
 
     def end() -> None:
@@ -188,7 +188,7 @@ def test_a_store_has_one_service(tmp_path: Path) -> None:
         lock.release()
 
 
-def test_a_store_that_cannot_be_made_is_told(tmp_path: Path) -> None:
+def test_a_store_that_cannot_be_created_is_reported(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match="store cannot be written"):
         serve_site(site(tmp_path / "file" / "x", site_camera()), Bench().tell, StopRequest())

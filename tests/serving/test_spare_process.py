@@ -52,7 +52,7 @@ class Scene:
         self.tick()
 
 
-def test_it_stands_ready_once_all_is_calm_and_takes_the_next_job(tmp_path: Path) -> None:
+def test_a_spare_starts_once_all_cameras_are_stable_and_takes_the_next_job(tmp_path: Path) -> None:
     scene = Scene(tmp_path)
     scene.tick()
     scene.tick(10 * SETTLE_S)
@@ -77,7 +77,7 @@ def test_it_stands_ready_once_all_is_calm_and_takes_the_next_job(tmp_path: Path)
     assert scene.begun[3].closed
 
 
-def test_one_that_dies_is_no_job_lost_and_is_begun_ever_more_seldom(tmp_path: Path) -> None:
+def test_a_spare_that_dies_loses_no_job_and_restarts_with_growing_waits(tmp_path: Path) -> None:
     scene = Scene(tmp_path)
     scene.tick()
     scene.all_watch()

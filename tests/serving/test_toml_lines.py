@@ -16,7 +16,7 @@ KEYS = st.lists(NAMES, min_size=0, max_size=4, unique=True)
 
 @settings(max_examples=30)
 @given(KEYS, st.lists(KEYS, max_size=2), st.integers(0, 2))
-def test_a_key_stands_where_the_reader_takes_it_from(
+def test_keys_are_located_as_tomllib_reads_them(
     top: list[str], tables: list[list[str]], blank: int
 ) -> None:
     """Each value is the number of its own line."""
@@ -63,7 +63,7 @@ actors = { arm = 3 }
         (("nothing",), 1, 1),
     ],
 )
-def test_what_has_no_line_of_its_own_is_told_where_it_would_stand(
+def test_a_value_without_a_line_is_located_at_its_table(
     path: tuple[str | int, ...], line: int, column: int
 ) -> None:
     found = locate(TEXT, path, "f")
@@ -71,7 +71,7 @@ def test_what_has_no_line_of_its_own_is_told_where_it_would_stand(
 
 
 @pytest.mark.parametrize(("text", "line"), [("a = 1\nb = = 2\n", 2), ('a = "', 1), ("", 1)])
-def test_a_text_that_is_no_toml_is_marked_where_it_ends_to_be(text: str, line: int) -> None:
+def test_syntax_errors_are_located(text: str, line: int) -> None:
     try:
         tomllib.loads(text)
         said = ""

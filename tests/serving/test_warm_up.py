@@ -9,7 +9,7 @@ from visup.percepts.motion.segmenter import MotionSegmenter
 from visup.serving import warm_up
 
 
-def test_a_camera_that_pans_is_part_of_the_warm_up(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_warm_up_includes_a_panning_camera(monkeypatch: pytest.MonkeyPatch) -> None:
     sizes: list[tuple[int, int]] = []
     moves: list[bool] = []
 

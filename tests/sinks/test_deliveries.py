@@ -34,7 +34,7 @@ ACTS = st.lists(
 
 @settings(max_examples=20)
 @given(ACTS)
-def test_every_sink_gets_every_record_in_order_whoever_is_killed(
+def test_every_sink_gets_every_record_in_order_despite_kills(
     tmp_path_factory: pytest.TempPathFactory, acts: list[str]
 ) -> None:
     path = tmp_path_factory.mktemp("log") / "deliveries.sqlite"
@@ -62,7 +62,7 @@ def test_every_sink_gets_every_record_in_order_whoever_is_killed(
     log.close()
 
 
-def test_of_too_many_the_oldest_are_lost_and_counted(
+def test_on_overflow_the_oldest_records_are_dropped_and_counted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(delivery_log, "MAX_WAITING", 3)
@@ -74,7 +74,7 @@ def test_of_too_many_the_oldest_are_lost_and_counted(
     log.close()
 
 
-def test_a_file_that_is_none_is_told(tmp_path: Path) -> None:
+def test_an_invalid_queue_file_is_reported(tmp_path: Path) -> None:
     (tmp_path / "d.sqlite").write_text("no database, but long enough to be read as one")
     with pytest.raises(OutputError, match="queue of undelivered alerts"):
         DeliveryLog(tmp_path / "d.sqlite")
@@ -113,7 +113,7 @@ def wait_for(what: Callable[[], object]) -> None:
         time.sleep(0.005)
 
 
-def test_a_sink_that_was_down_gets_all_and_a_refusal_holds_up_nobody(log: DeliveryLog) -> None:
+def test_a_sink_that_was_down_gets_all_records_and_a_refusal_blocks_none(log: DeliveryLog) -> None:
     down = [OSError("down"), OSError("down")]
     sink = Flaky(*down, None, DeliveryError("no", final=True))
     outbox = DurableOutbox(sink, "0", log)
@@ -128,7 +128,7 @@ def test_a_sink_that_was_down_gets_all_and_a_refusal_holds_up_nobody(log: Delive
     assert outbox.note
 
 
-def test_one_that_stays_down_is_told_and_ends_in_time(log: DeliveryLog) -> None:
+def test_a_sink_that_stays_down_is_reported_and_closes_in_time(log: DeliveryLog) -> None:
     outbox = DurableOutbox(Flaky(*[OSError("down")] * 1000), "0", log)
     log.add(["0"], [{"n": 1}])
     outbox.wake()
@@ -142,7 +142,7 @@ def test_one_that_stays_down_is_told_and_ends_in_time(log: DeliveryLog) -> None:
     assert not any(t.name == "sink flaky" for t in threading.enumerate())
 
 
-def test_alerts_of_a_run_that_was_killed_with_its_sink_down_are_told_once(
+def test_alerts_of_a_run_killed_while_its_sink_was_down_are_delivered_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     clip = write_clip(tmp_path / "disc.avi", moving_disc(40))

@@ -38,7 +38,7 @@ def _quick(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("restarts", [0, 1])
-def test_without_room_hundreds_of_alerts_are_noted_and_crossed_off(
+def test_on_a_full_disk_hundreds_of_alerts_are_stored_and_removed(
     tmp_path: Path, restarts: int
 ) -> None:
     path = tmp_path / "d.sqlite"
@@ -56,7 +56,7 @@ def test_without_room_hundreds_of_alerts_are_noted_and_crossed_off(
     log.close()
 
 
-def test_when_even_the_reserve_is_used_up_nothing_of_a_step_is_noted(tmp_path: Path) -> None:
+def test_without_a_reserve_no_part_of_a_step_is_stored(tmp_path: Path) -> None:
     log = DeliveryLog(tmp_path / "d.sqlite")
 
     def fill() -> None:
@@ -72,7 +72,7 @@ def test_when_even_the_reserve_is_used_up_nothing_of_a_step_is_noted(tmp_path: P
 
 @settings(max_examples=15)
 @given(st.lists(st.tuples(st.integers(0, 5), st.sampled_from(["opened", "closed"]), st.booleans())))
-def test_an_alert_is_noted_once_whoever_tells_it(
+def test_an_alert_is_stored_once_even_by_several_processes(
     tmp_path_factory: pytest.TempPathFactory, acts: list[tuple[int, str, bool]]
 ) -> None:
     path = tmp_path_factory.mktemp("log") / "d.sqlite"
@@ -95,7 +95,7 @@ def test_an_alert_is_noted_once_whoever_tells_it(
     log.close()
 
 
-def test_the_name_of_a_delivery_follows_from_its_alert(tmp_path: Path) -> None:
+def test_delivery_ids_are_derived_from_alerts(tmp_path: Path) -> None:
     log = DeliveryLog(tmp_path / "d.sqlite")
     first = log.labelled(alert(3))[DELIVERY]
     log.close()
@@ -106,7 +106,7 @@ def test_the_name_of_a_delivery_follows_from_its_alert(tmp_path: Path) -> None:
     log.close()
 
 
-def test_one_that_was_sent_and_cannot_be_crossed_off_is_not_sent_again(
+def test_a_sent_record_that_cannot_be_removed_is_not_sent_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(durable_outbox, "INITIAL_WAIT_S", 0.01)
@@ -131,7 +131,7 @@ def test_one_that_was_sent_and_cannot_be_crossed_off_is_not_sent_again(
     assert sink.got == [1, 2]
 
 
-def test_a_change_that_a_kill_cut_short_is_undone_and_the_reserve_stays(tmp_path: Path) -> None:
+def test_a_transaction_cut_short_by_a_kill_is_undone_and_the_reserve_kept(tmp_path: Path) -> None:
     path = tmp_path / "d.sqlite"
     log = DeliveryLog(path)
     log.add(["a"], [alert(n, text="x" * 1000) for n in range(50)], 1)
@@ -151,7 +151,7 @@ def test_a_change_that_a_kill_cut_short_is_undone_and_the_reserve_stays(tmp_path
     log.close()
 
 
-def test_a_file_of_an_earlier_version_is_taken_over(tmp_path: Path) -> None:
+def test_a_file_of_an_earlier_version_is_read(tmp_path: Path) -> None:
     path = tmp_path / "d.sqlite"
     db = sqlite3.connect(path, isolation_level=None)
     db.execute("PRAGMA journal_mode=WAL")

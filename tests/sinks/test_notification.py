@@ -57,7 +57,7 @@ def post_office() -> Iterator[tuple[int, list[str]]]:
         thread.join(10.0)
 
 
-def test_a_letter_says_what_happened_and_brings_the_picture(tmp_path: Path) -> None:
+def test_a_mail_has_the_sentence_and_the_picture(tmp_path: Path) -> None:
     picture = tmp_path / "alert-1.jpg"
     cv2.imwrite(str(picture), np.zeros((8, 8, 3), np.uint8))
     with post_office() as (port, letters):
@@ -77,7 +77,7 @@ def test_a_letter_says_what_happened_and_brings_the_picture(tmp_path: Path) -> N
     assert b"2026-05-04T07:12:33Z" in text
 
 
-def test_a_server_that_is_not_there_is_told_without_the_password() -> None:
+def test_an_unreachable_server_is_reported_without_the_password() -> None:
     sink = Notification(
         "mailto://guard:swordfish@127.0.0.1:9?from=v@cell.example&to=lead@cell.example&mode=insecure"
     )
@@ -88,7 +88,7 @@ def test_a_server_that_is_not_there_is_told_without_the_password() -> None:
 
 
 @pytest.mark.parametrize("address", ["", "nowhere", "slack://swordfish", "nosuch://swordfish/x"])
-def test_an_address_that_nobody_knows_is_refused_without_showing_it(address: str) -> None:
+def test_an_unknown_address_is_refused_without_showing_it(address: str) -> None:
     with pytest.raises(SettingsError) as told:
         open_sink(f"notify:{address}")
     assert "swordfish" not in str(told.value)
@@ -107,6 +107,6 @@ def test_an_address_that_nobody_knows_is_refused_without_showing_it(address: str
         ),
     ],
 )  # fmt: skip
-def test_what_a_message_says(record: dict[str, object], title: str, said: str) -> None:
+def test_messages_have_title_and_body(record: dict[str, object], title: str, said: str) -> None:
     assert title_of(record) == title
     assert body_of(record).splitlines()[0] == said

@@ -56,7 +56,7 @@ class Slow:
         self.closed = True
 
 
-def test_a_slow_sink_holds_nobody_up_and_what_it_misses_is_counted_and_told() -> None:
+def test_a_slow_sink_blocks_no_step_and_its_dropped_records_are_reported() -> None:
     slow = Slow()
     box = Outbox(slow, max_length=5)
     begin = time.perf_counter()
@@ -87,7 +87,7 @@ class Failing:
         raise RuntimeError("not even that")
 
 
-def test_a_sink_that_raises_is_tried_again_with_the_next_record() -> None:
+def test_a_failing_sink_is_retried_with_the_next_record() -> None:
     box = Outbox(Failing({1, 3}))
     for n in range(5):
         box.offer(n)
@@ -96,7 +96,7 @@ def test_a_sink_that_raises_is_tried_again_with_the_next_record() -> None:
     assert "not even that" in box.fault
 
 
-def test_a_sink_that_never_answers_does_not_hold_up_the_end() -> None:
+def test_a_sink_that_never_answers_does_not_delay_the_end() -> None:
     slow = Slow()
     box = Outbox(slow)
     for n in range(10):
@@ -157,7 +157,7 @@ def server(*codes: int) -> Iterator[tuple[str, list[bytes]]]:
     ("codes", "posts", "fails"),
     [((), 1, False), ((503, 429), 3, False), ((404,), 1, True), ((500,) * 9, 4, True)],
 )
-def test_a_webhook_is_tried_again_when_the_server_is_at_fault(
+def test_a_webhook_is_retried_after_server_errors(
     codes: tuple[int, ...], posts: int, fails: bool
 ) -> None:
     waited: list[float] = []
@@ -172,7 +172,7 @@ def test_a_webhook_is_tried_again_when_the_server_is_at_fault(
     assert waited == [0.5, 1.0, 2.0][: posts - 1]
 
 
-def test_a_webhook_that_nobody_serves_fails_in_the_end() -> None:
+def test_an_unreachable_webhook_finally_fails() -> None:
     hook = Webhook("http://127.0.0.1:9/", wait=lambda s: None)
     with pytest.raises(OSError, match="refused"):
         hook.deliver({})
@@ -182,7 +182,7 @@ def test_a_webhook_that_nobody_serves_fails_in_the_end() -> None:
     "wanted",
     ["", "x", "file:", "jsonl:x", "webhook:ftp://x", "tape:x", "mqtt:host", "mqtt:h:p/t", "otel:x"],
 )
-def test_a_sink_that_cannot_be_read_is_refused(wanted: str) -> None:
+def test_an_invalid_sink_is_refused(wanted: str) -> None:
     with pytest.raises(SettingsError):
         open_sink(wanted)
 
@@ -246,7 +246,7 @@ def test_alerts_reach_an_mqtt_broker() -> None:
     assert got == [("cell/alerts", b'{"a":1}'), ("cell/alerts", b'{"a":2}')]
 
 
-def test_steps_become_spans_and_figures() -> None:
+def test_steps_become_spans_and_metrics() -> None:
     pytest.importorskip("opentelemetry.sdk", reason="the extra visup[otel] is not installed")
     from opentelemetry.sdk.metrics import MeterProvider
     from opentelemetry.sdk.metrics.export import InMemoryMetricReader
@@ -282,7 +282,7 @@ def test_steps_are_written_for_rerun(tmp_path: Path) -> None:
     assert path.stat().st_size > 500
 
 
-def test_a_run_tells_its_alerts_and_its_verdict_to_a_webhook(tmp_path: Path) -> None:
+def test_a_run_sends_its_alerts_and_verdict_to_a_webhook(tmp_path: Path) -> None:
     clip = write_clip(tmp_path / "clip.avi", moving_disc(40), fps=10.0)
     rules = tmp_path / "own.rules"
     rules.write_text(
@@ -320,7 +320,7 @@ def test_a_short_soak_is_flat_and_repeats(monkeypatch: pytest.MonkeyPatch) -> No
         ({"OTEL_RESOURCE_ATTRIBUTES": "service.name=cell-8"}, "cell-8"),
     ],
 )
-def test_telemetry_tells_whose_it_is(
+def test_telemetry_names_its_service(
     monkeypatch: pytest.MonkeyPatch, surroundings: dict[str, str], name: str
 ) -> None:
     pytest.importorskip("opentelemetry.sdk", reason="the extra visup[otel] is not installed")

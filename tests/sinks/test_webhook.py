@@ -74,7 +74,7 @@ def hook(url: str, timeout_s: float = 0.5) -> Webhook:
 
 @pytest.mark.parametrize("status", [301, 302, 303, 307, 308])
 @pytest.mark.parametrize("scheme", ["http", "file", "ftp"])
-def test_no_redirect_is_followed_and_none_counts_as_delivered(status: int, scheme: str) -> None:
+def test_redirects_are_not_followed_and_count_as_failures(status: int, scheme: str) -> None:
     with server(says(b"HTTP/1.1 200 OK\r\nContent-Length: 0\r\n\r\n")) as (other, reached):
         place = other if scheme == "http" else f"{scheme}:///etc/passwd"
         answer = f"HTTP/1.1 {status} Moved\r\nLocation: {place}\r\nContent-Length: 0\r\n\r\n"
@@ -98,7 +98,7 @@ def test_no_redirect_is_followed_and_none_counts_as_delivered(status: int, schem
         lambda client: time.sleep(0.6),
     ],
 )
-def test_an_answer_without_end_ends_in_time(answer: Answer) -> None:
+def test_an_endless_response_times_out(answer: Answer) -> None:
     with server(answer) as (url, _):
         begin = time.monotonic()
         with pytest.raises(OSError, match=r"."):
@@ -114,7 +114,7 @@ def test_an_answer_without_end_ends_in_time(answer: Answer) -> None:
         without_end(b"HTTP/1.1 204 OK\r\nTransfer-Encoding: chunked\r\n\r\n", b"1\r\nx\r\n", 0.1),
     ],
 )
-def test_of_a_body_nothing_is_read(answer: Answer) -> None:
+def test_response_bodies_are_not_read(answer: Answer) -> None:
     with server(answer) as (url, got):
         begin = time.monotonic()
         hook(url).deliver({"a": 1})
@@ -134,7 +134,7 @@ def test_words_of_the_server_are_not_repeated() -> None:
     assert str(told.value) == "the server answered 404 (Not Found)"
 
 
-def test_records_follow_each_other_on_new_connections() -> None:
+def test_each_record_uses_a_new_connection() -> None:
     with server(says(b"HTTP/1.1 200 OK\r\nContent-Length: 0\r\n\r\n")) as (url, got):
         one = hook(url)
         for n in range(3):
@@ -143,7 +143,7 @@ def test_records_follow_each_other_on_new_connections() -> None:
     assert [g[-7:] for g in got] == [b'{"n":0}', b'{"n":1}', b'{"n":2}']
 
 
-def test_a_server_can_tell_who_sent_a_record_and_when() -> None:
+def test_a_server_can_verify_sender_and_time_of_a_record() -> None:
     access = WebhookAccess({"Authorization": "Bearer marlin"}, key="swordfish")
     with server(says(b"HTTP/1.1 200 OK\r\nContent-Length: 0\r\n\r\n")) as (url, got):
         Webhook(url, access=access).deliver({"record": "alert"})
@@ -178,7 +178,7 @@ def test_another_body_or_time_has_another_signature(a: bytes, b: bytes, now: int
         ({}, ""),
     ],
 )
-def test_what_cannot_stand_in_a_request_is_refused_without_the_secret(
+def test_invalid_headers_are_refused_without_showing_the_secret(
     headers: dict[str, str], key: str | None
 ) -> None:
     with pytest.raises(SettingsError) as refused:
@@ -186,6 +186,6 @@ def test_what_cannot_stand_in_a_request_is_refused_without_the_secret(
     assert "rlin" not in str(refused.value)
 
 
-def test_neither_header_nor_key_is_shown() -> None:
+def test_headers_and_key_are_never_shown() -> None:
     assert "marlin" not in repr(WebhookAccess({"A": "marlin"}, "marlin"))
     assert "marlin" not in repr(RunOptions(webhook_headers={"A": "marlin"}, webhook_key="marlin"))

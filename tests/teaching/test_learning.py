@@ -35,32 +35,34 @@ PLACES = st.lists(st.tuples(st.integers(0, 300), st.integers(8, 60)), min_size=1
 
 
 @given(PLACES, st.integers(1, 8))
-def test_a_few_are_chosen_in_order_and_none_twice(places: list[tuple[int, int]], most: int) -> None:
+def test_at_most_so_many_views_are_chosen_in_order_without_repetition(
+    places: list[tuple[int, int]], most: int
+) -> None:
     seen = [sighting(n, x, side) for n, (x, side) in enumerate(places)]
     chosen = [s.frame for s in spread(seen, most)]
     assert chosen == sorted(set(chosen))
     assert 1 <= len(chosen) <= most
 
 
-def test_what_is_chosen_differs() -> None:
+def test_chosen_views_differ() -> None:
     """Of a long rest and a short move, both are shown."""
     seen = [sighting(n, 10) for n in range(90)] + [sighting(90 + n, 10 + 30 * n) for n in range(8)]
     assert {s.region.bbox[0] for s in spread(seen, 4)} >= {10, 220}
 
 
-def test_the_clear_half_is_taken() -> None:
+def test_the_clearer_half_is_kept() -> None:
     covered = [sighting(n, 10, hidden=0.8) for n in range(0, 10)]
     free = [sighting(n, 10) for n in range(10, 20)]
     assert [s.frame for s in clear([*covered, *free])] == list(range(10, 20))
 
 
-def test_a_region_that_is_two_objects_shows_neither() -> None:
+def test_regions_of_two_objects_are_left_out() -> None:
     two = [sighting(n, 10, shared=True) for n in range(9)]
     assert clear(two) == []
     assert [s.frame for s in clear([*two, sighting(9, 30)])] == [9]
 
 
-def test_a_size_that_jumps_is_doubted() -> None:
+def test_sightings_whose_size_jumps_are_left_out() -> None:
     sides = [20, 20, 20, 44, 20, 20, 20]
     assert 3 not in {s.frame for s in clear([sighting(n, 10, d) for n, d in enumerate(sides)])}
 
@@ -84,7 +86,7 @@ def first_object(run: Path) -> int:
     return min(o.id for o in visup.open_run(run).objects if o.confirmed)
 
 
-def test_what_was_confirmed_becomes_views(run: Path, clip: Path, tmp_path: Path) -> None:
+def test_confirmed_objects_become_views(run: Path, clip: Path, tmp_path: Path) -> None:
     number = first_object(run)
     models = visup.learn(run, models=tmp_path / "a.models", things={"disc": number}, views=3)
     assert models.names() == ("disc",)
@@ -106,7 +108,7 @@ def command(*args: object) -> tuple[int, str]:
     return done.exit_code, told
 
 
-def test_the_command_tells_and_draws(run: Path, tmp_path: Path) -> None:
+def test_the_command_reports_and_draws_the_views(run: Path, tmp_path: Path) -> None:
     models = tmp_path / "a.models"
     code, told = command(run, "--models", models, "--thing", f"disc={first_object(run)}")
     assert code == 0, told
@@ -132,7 +134,7 @@ def test_the_command_tells_and_draws(run: Path, tmp_path: Path) -> None:
         (["--thing", "disc=1", "--source", "gone.mp4"], "gone.mp4"),
     ],
 )
-def test_what_cannot_be_learned_is_told(
+def test_errors_of_learning_are_reported(
     run: Path, tmp_path: Path, args: list[str], message: str
 ) -> None:
     code, told = command(run, "--models", tmp_path / "a.models", *args)
@@ -150,7 +152,7 @@ def test_another_video_is_refused(run: Path, tmp_path: Path) -> None:
         learn_from(run, tmp_path / "a.models", {"disc": first_object(run)}, str(other), 3)
 
 
-def test_answers_of_the_operator_count(clip: Path, run: Path, tmp_path: Path) -> None:
+def test_answers_of_the_operator_confirm_objects(clip: Path, run: Path, tmp_path: Path) -> None:
     models = ModelDatabase.create(tmp_path / "known.models")
     number = first_object(run)
     models = visup.learn(run, models=models, things={"disc": number}, views=1)

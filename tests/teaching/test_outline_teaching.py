@@ -27,7 +27,7 @@ def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("order", [(0, 1, 80, 3, 79, 81, 0), (89, 0), (50, 50, 49)])
-def test_frames_are_found_by_their_number(clip: Path, order: tuple[int, ...]) -> None:
+def test_frames_are_read_by_number(clip: Path, order: tuple[int, ...]) -> None:
     """In whatever order they are asked for."""
     with ClipFrames(str(clip)) as frames:
         assert frames.count == 90
@@ -36,7 +36,7 @@ def test_frames_are_found_by_their_number(clip: Path, order: tuple[int, ...]) ->
 
 
 @pytest.mark.parametrize("number", [-1, 90, 5000])
-def test_a_frame_that_is_not_there_is_told(clip: Path, number: int) -> None:
+def test_a_missing_frame_is_reported(clip: Path, number: int) -> None:
     with ClipFrames(str(clip)) as frames:
         with pytest.raises(SourceError, match=f"no frame {number}") as refused:
             frames.at(number)
@@ -72,7 +72,7 @@ def test_a_video_a_picture_and_an_array_teach_the_same(clip: Path, tmp_path: Pat
         assert (view.image[view.mask] == (30, 30, 220)).all()
 
 
-def test_a_database_teaches_on(clip: Path, tmp_path: Path) -> None:
+def test_teaching_adds_views_to_a_database(clip: Path, tmp_path: Path) -> None:
     models = visup.teach(clip, {"part": corners(0)}, models=tmp_path / "a.models")
     models = visup.teach(clip, {"part": corners(9), "tray": corners(9)}, models=models, frame=9)
     assert [v.name for v in models.taught] == ["part", "part", "tray"]
@@ -89,7 +89,7 @@ def test_a_database_teaches_on(clip: Path, tmp_path: Path) -> None:
         ({" ": corners(0)}, "cannot be called"),
     ],
 )
-def test_what_shows_nothing_is_refused_and_no_database_begun(
+def test_an_empty_outline_is_refused_and_no_database_created(
     tmp_path: Path, outlines: Any, message: str
 ) -> None:
     with pytest.raises(VisupError, match=message):
@@ -111,7 +111,7 @@ def drawn(clip: str, number: int) -> dict[str, Any]:
     return {"clip": clip, "frame": number, "polygon": corners(number)}
 
 
-def test_a_brief_teaches_its_own_clip_first(tmp_path: Path) -> None:
+def test_outlines_in_the_own_clip_of_a_brief_take_precedence(tmp_path: Path) -> None:
     content = {
         "teach": {"part": drawn("first", 0), "tray": drawn("first", 1)},
         "teach_own": {"part": drawn("second", 2)},
@@ -138,19 +138,19 @@ def test_a_brief_teaches_its_own_clip_first(tmp_path: Path) -> None:
         ({"teach": {"part": drawn("third", 0)}}, "'third' is not there"),
     ],
 )
-def test_a_brief_that_is_none_is_refused(tmp_path: Path, content: Any, message: str) -> None:
+def test_an_invalid_brief_is_refused(tmp_path: Path, content: Any, message: str) -> None:
     path = brief(tmp_path, content)
     with pytest.raises(SettingsError, match=message) as refused:
         teach_brief(path, tmp_path / "a.models")
     assert str(path) in str(refused.value)
 
 
-def test_a_missing_brief_is_told(tmp_path: Path) -> None:
+def test_a_missing_brief_is_reported(tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match="cannot be read"):
         teach_brief(tmp_path / "no.json", tmp_path / "a.models")
 
 
-def test_what_is_told_names_size_place_and_what_to_heed(clip: Path, tmp_path: Path) -> None:
+def test_the_report_of_a_view_has_size_position_and_warnings(clip: Path, tmp_path: Path) -> None:
     small = [(0, 0), (9, 0), (9, 9), (0, 9)]
     content = {"teach": {"dot": {"clip": "first", "frame": 0, "polygon": small}}}
     lesson = teach_brief(brief(tmp_path, content), tmp_path / "a.models")
@@ -160,7 +160,7 @@ def test_what_is_told_names_size_place_and_what_to_heed(clip: Path, tmp_path: Pa
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the shared data is not there")
-def test_every_shared_brief_is_read_and_a_thing_is_taught_within_a_second(tmp_path: Path) -> None:
+def test_every_shared_brief_is_read_and_an_object_taught_within_a_second(tmp_path: Path) -> None:
     briefs = sorted(SHARED.glob("*/*/brief.json"))
     assert all(read_clip_outlines(path) for path in briefs)
     views = views_of(read_clip_outlines(briefs[0]))

@@ -15,7 +15,7 @@ FORMS = ("{x},{y}", "({x}, {y})", "[{x},{y}]", "{x} , {y}", "( {x} {y} )")
 
 
 @given(CORNERS, st.sampled_from(FORMS), st.sampled_from((" ", "; ", ", ", "\n", "  ")))
-def test_corners_may_be_written_in_many_ways(
+def test_corners_can_be_written_in_several_ways(
     corners: list[tuple[float, float]], form: str, between: str
 ) -> None:
     text = between.join(form.format(x=x, y=y) for x, y in corners)
@@ -25,7 +25,9 @@ def test_corners_may_be_written_in_many_ways(
 
 
 @given(CORNERS, st.booleans())
-def test_quoted_or_not_is_the_same(corners: list[tuple[float, float]], glued: bool) -> None:
+def test_quotes_around_corners_are_optional(
+    corners: list[tuple[float, float]], glued: bool
+) -> None:
     words = [f"{x},{y}" for x, y in corners]
     words[0] = f"part={words[0]}"
     flag = ["--outline", words[0]] if not glued else [f"--outline={words[0]}"]
@@ -35,7 +37,7 @@ def test_quoted_or_not_is_the_same(corners: list[tuple[float, float]], glued: bo
     assert parse_outline(joined[-3].removeprefix("--outline=")).corners == tuple(corners)
 
 
-def test_two_outlines_in_a_row_stay_two() -> None:
+def test_consecutive_outlines_are_kept_apart() -> None:
     words = ["--outline", "a=1,2", "3,4", "5,6", "--outline", "b=1,2", "3,4", "5,6", "clip.mp4"]
     expected = ["--outline", "a=1,2 3,4 5,6", "--outline", "b=1,2 3,4 5,6", "clip.mp4"]
     assert join_corners(words) == expected
@@ -56,7 +58,7 @@ def test_two_outlines_in_a_row_stay_two() -> None:
         ("part=nan,2 3,4 5,6", "cannot be read at 'nan,2 3,4 5,6'"),
     ],
 )
-def test_what_is_no_outline_is_told(text: str, message: str) -> None:
+def test_an_invalid_outline_is_reported(text: str, message: str) -> None:
     with pytest.raises(SettingsError) as refused:
         parse_outline(text)
     assert message in refused.value.what

@@ -55,7 +55,7 @@ def test_frames_and_facts_are_served(page: TeachingPage) -> None:
     assert (facts["count"], facts["frame"], facts["known"]) == (20, 2, {})
 
 
-def test_what_is_posted_is_stored_and_told(page: TeachingPage, tmp_path: Path) -> None:
+def test_posted_outlines_are_stored_and_reported(page: TeachingPage, tmp_path: Path) -> None:
     status, data = ask(page, "POST", f"{page.prefix}save", things())
     assert status == 200
     assert json.loads(data)["messages"][0] == f"part: {SIDE} x {SIDE} pixels at (23, {TOP})."
@@ -93,7 +93,7 @@ def test_what_is_posted_is_stored_and_told(page: TeachingPage, tmp_path: Path) -
         ("POST", "{prefix}snap", {"frame": "0", "corners": corners(0)}, {}, 422),
     ],
 )
-def test_what_is_not_as_it_should_be_is_refused(
+def test_invalid_requests_are_refused(
     page: TeachingPage, method: str, path: str, body: Any, headers: dict[str, str], status: int
 ) -> None:
     found, data = ask(page, method, path.format(prefix=page.prefix), body, **headers)
@@ -103,7 +103,7 @@ def test_what_is_not_as_it_should_be_is_refused(
     assert page.result is None
 
 
-def test_two_pages_have_two_addresses(tmp_path: Path) -> None:
+def test_each_page_has_its_own_address(tmp_path: Path) -> None:
     clip = write_clip(tmp_path / "clip.avi", 2)
     with ClipFrames(str(clip)) as frames:
         pages = [TeachingPage(frames, tmp_path / "a.models") for _ in range(2)]
@@ -142,7 +142,9 @@ def taught(browser: Browser, tmp_path: Path) -> ModelDatabase:
     return ModelDatabase.open(tmp_path / "a.models")
 
 
-def test_a_user_draws_with_the_mouse(page: TeachingPage, browser: Browser, tmp_path: Path) -> None:
+def test_outlines_can_be_drawn_with_the_mouse(
+    page: TeachingPage, browser: Browser, tmp_path: Path
+) -> None:
     """Zoomed in, one corner taken back and one moved, two things in two frames."""
     browser.move(*at(browser, 40, 50))
     browser.until("document.getElementById('spot').textContent === '(40, 50)'")
@@ -173,7 +175,7 @@ def test_a_user_draws_with_the_mouse(page: TeachingPage, browser: Browser, tmp_p
     assert page.wait(10)
 
 
-def test_a_user_draws_with_keys_alone(browser: Browser, tmp_path: Path) -> None:
+def test_outlines_can_be_drawn_with_the_keyboard(browser: Browser, tmp_path: Path) -> None:
     """The cross begins in the middle, (80, 60)."""
     browser.value("canvas.focus()")
     browser.press(" ")
@@ -187,9 +189,7 @@ def test_a_user_draws_with_keys_alone(browser: Browser, tmp_path: Path) -> None:
     assert (view.name, view.bbox) == ("tray", (80, 60, 21, 21))
 
 
-def test_what_was_drawn_can_be_removed_and_must_be_named(
-    page: TeachingPage, browser: Browser
-) -> None:
+def test_outlines_can_be_removed_and_need_a_name(page: TeachingPage, browser: Browser) -> None:
     for corner in corners(2):
         browser.click(*at(browser, *corner))
     browser.press("Enter")

@@ -38,7 +38,7 @@ def test_a_rough_outline_comes_closer(centre: tuple[int, int], radius: int) -> N
     assert snapped(picture, drawn) == found
 
 
-def test_where_there_are_no_edges_it_stays() -> None:
+def test_without_edges_the_outline_is_unchanged() -> None:
     flat = np.full((100, 100, 3), 128, np.uint8)
     drawn = DrawnOutline("none", ((20.0, 20.0), (60.0, 20.0), (60.0, 60.0), (20.0, 60.0)))
     assert overlap(snapped(flat, drawn), overlap_mask(drawn)) > 0.5
@@ -50,7 +50,7 @@ def overlap_mask(outline: DrawnOutline) -> NDArray[np.bool_]:
     return mask > 0
 
 
-def test_a_sliver_is_left_as_it_is() -> None:
+def test_a_sliver_is_unchanged() -> None:
     picture, _ = scene((160, 120), 50)
     drawn = DrawnOutline("line", ((10.0, 10.0), (200.0, 10.0), (200.0, 11.0)))
     assert snapped(picture, drawn) == drawn

@@ -16,8 +16,8 @@ from visup.wording import prose
 
 WHITE: Rgb = (255, 255, 255)
 INK: Rgb = (12, 16, 22)
-MOST_ALERTS = 2
-MOST_TASKS = 2
+MAX_ALERTS = 2
+MAX_TASKS = 2
 
 Box = tuple[int, int, int, int]
 Image = NDArray[np.uint8]
@@ -113,11 +113,11 @@ def _outline(image: Image, belief: ObjectBelief, scale: Scale) -> None:
 def _dashes(points: NDArray[np.int32], length: float) -> list[NDArray[np.int32]]:
     """A closed line cut into dashes."""
     closed = np.vstack([points, points[:1]]).astype(float)
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))])
+    arc_length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))])
     dashes = []
-    for start in np.arange(0.0, along[-1], 2 * length):
-        at = np.linspace(start, min(start + length, along[-1]), 5)
-        xy = np.stack([np.interp(at, along, closed[:, k]) for k in (0, 1)], axis=1)
+    for start in np.arange(0.0, arc_length[-1], 2 * length):
+        at = np.linspace(start, min(start + length, arc_length[-1]), 5)
+        xy = np.stack([np.interp(at, arc_length, closed[:, k]) for k in (0, 1)], axis=1)
         dashes.append(np.round(xy).astype(np.int32).reshape(-1, 1, 2))
     return dashes
 
@@ -128,45 +128,45 @@ def _labels(
     """Labels next to their objects without overlap."""
     placed: list[Box] = []
     # Hidden objects without a name are of no interest to a reader.
-    told = (b for b in beliefs if b.presence is not Presence.HIDDEN or b.candidates)
-    for belief in sorted(told, key=lambda b: b.region.bbox[1]):
+    labelled = (b for b in beliefs if b.presence is not Presence.HIDDEN or b.candidates)
+    for belief in sorted(labelled, key=lambda b: b.region.bbox[1]):
         hidden = " (hidden)" if belief.presence is Presence.HIDDEN else ""
-        room = image.shape[1] - 4 * scale.pad
-        text = fitted(label_of(belief, mind) + hidden, scale.letters, room)
+        max_width = image.shape[1] - 4 * scale.pad
+        text = fitted(label_of(belief, mind) + hidden, scale.letters, max_width)
         width = ink(text, scale.letters).shape[1] + 3 * scale.pad if text else 0
-        box = _place(belief.region.bbox, (width, scale.row), placed, edges, image.shape[1])
+        box = _label_box(belief.region.bbox, (width, scale.row), placed, edges, image.shape[1])
         placed.append(box)
         shade(image, box, INK, 0.72)
         shade(image, (box[0], box[1], max(2, scale.pad - 2), box[3]), object_colour(belief.id), 1)
         write(image, text, (box[0] + 2 * scale.pad, box[1] + scale.pad - 1), scale.letters, WHITE)
 
 
-def _place(
-    around: Box, size: tuple[int, int], placed: list[Box], edges: tuple[int, int], width: int
+def _label_box(
+    object_box: Box, size: tuple[int, int], placed: list[Box], edges: tuple[int, int], width: int
 ) -> Box:
     """Above the object if there is room, else below it, moved down until nothing overlaps."""
-    (x, y, _, h), (w, row) = around, size
+    (x, y, _, h), (w, row) = object_box, size
     left = min(max(x, 0), max(width - w, 0))
     top, bottom = edges[0], max(edges[0], edges[1] - row)
-    wanted = [y - row - 3, y + h + 3, *range(top, bottom + 1, row)]
-    for at in wanted:
-        box = (left, min(max(at, top), bottom), w, row)
-        if not any(_intersect(box, other) for other in placed):
+    candidates = [y - row - 3, y + h + 3, *range(top, bottom + 1, row)]
+    for y_at in candidates:
+        box = (left, min(max(y_at, top), bottom), w, row)
+        if not any(_overlap(box, other) for other in placed):
             return box
     return left, min(max(y - row, top), bottom), w, row
 
 
-def _intersect(a: Box, b: Box) -> bool:
+def _overlap(a: Box, b: Box) -> bool:
     return a[0] < b[0] + b[2] and b[0] < a[0] + a[2] and a[1] < b[1] + b[3] and b[1] < a[1] + a[3]
 
 
 def _alerts(image: Image, alerts: tuple[Alert, ...], scale: Scale) -> int:
     """Open alerts across the top, most severe first; returns the y of their lower edge, pixels."""
-    graver = sorted(alerts, key=lambda a: (-a.severity, a.id))
-    graver = [a for a in graver if a.closed is None and a.severity > Severity.INFO]
+    warnings = sorted(alerts, key=lambda a: (-a.severity, a.id))
+    warnings = [a for a in warnings if a.closed is None and a.severity > Severity.INFO]
     y = 0
-    for i, alert in enumerate(graver[:MOST_ALERTS]):
-        more = len(graver) - MOST_ALERTS if i == MOST_ALERTS - 1 else 0
+    for i, alert in enumerate(warnings[:MAX_ALERTS]):
+        more = len(warnings) - MAX_ALERTS if i == MAX_ALERTS - 1 else 0
         y = _banner(image, y, alert, f" (+{more} more)" if more > 0 else "", scale)
     return y
 
@@ -204,7 +204,7 @@ def _stages(image: Image, mind: Mind, scale: Scale) -> int:
     """The stages of tasks and the time along the bottom; returns the y of their upper edge, pixels."""
     height, width = int(image.shape[0]), int(image.shape[1])
     time = f"{mind.time:.1f} s"
-    shown = mind.tasks[:MOST_TASKS]
+    shown = mind.tasks[:MAX_TASKS]
     y = height - scale.row * max(1, len(shown))
     if shown:
         shade(image, (0, y, width, height - y), INK, 0.72)
@@ -218,19 +218,21 @@ def _stages(image: Image, mind: Mind, scale: Scale) -> int:
         x = 2 * scale.pad
         name = fitted(task.task, scale.letters, width // 4)
         write(image, name, (x, at + scale.pad - 1), scale.letters, WHITE)
-        _chips(image, task.stages, (x + _width(name, scale) + 3 * scale.pad, at), clock[0], scale)
+        _stage_chips(
+            image, task.stages, (x + _width(name, scale) + 3 * scale.pad, at), clock[0], scale
+        )
     return y
 
 
-def _chips(
+def _stage_chips(
     image: Image, stages: tuple[StageBelief, ...], at: tuple[int, int], right: int, scale: Scale
 ) -> None:
     """One chip for each stage, with a colour and a word for its status."""
     x, y = at
-    each = (right - x - scale.pad) // max(1, len(stages))
+    chip_width = (right - x - scale.pad) // max(1, len(stages))
     for stage in stages:
         text = stage.stage if stage.status is Status.PENDING else f"{stage.stage}: {stage.status}"
-        text = fitted(text, scale.letters, each - 3 * scale.pad)
+        text = fitted(text, scale.letters, chip_width - 3 * scale.pad)
         if not text:
             return
         width = _width(text, scale) + 2 * scale.pad

@@ -18,8 +18,8 @@ from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Step
 from visup.narrative import Narrative
 from visup.report.annotate import annotate
-from visup.report.bounded_buffers import Heaviest, SpanRecorder, Thinned
-from visup.report.crops import cut_out, jpeg_of, shrunk
+from visup.report.bounded_buffers import EvenSample, SpanRecorder, TopWeighted
+from visup.report.crops import jpeg_of, object_crop, shrunk
 from visup.report.moments import matches_of, sample_of, state_of, weight_of
 from visup.report.records import (
     BehaviourCost,
@@ -36,9 +36,9 @@ from visup.wording import worded_once
 
 __all__ = ["Collector", "ReportLimits", "RunData"]
 
-PICTURE_WIDTH = 720
-MOST_LOOKS = 4
-ENDS_WEIGHT = 2
+MAX_PICTURE_WIDTH = 720
+MAX_CLOSEUPS = 4
+LAST_FRAME_WEIGHT = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ class ReportLimits:
 
 
 @dataclass(slots=True)
-class _CostTally:
+class _BehaviourTotals:
     """The accumulated cost of a behaviour."""
 
     runs: int = 0
@@ -80,28 +80,28 @@ class Collector:
     """
 
     limits: ReportLimits = field(default_factory=ReportLimits)
-    _samples: Thinned[Sample] = field(init=False, repr=False)
+    _samples: EvenSample[Sample] = field(init=False, repr=False)
     _spans: SpanRecorder = field(init=False, repr=False)
-    _pictures: Heaviest[KeyFrame] = field(init=False, repr=False)
+    _pictures: TopWeighted[KeyFrame] = field(init=False, repr=False)
     _events: list[Event] = field(default_factory=list, init=False, repr=False)
     _narrative: Narrative = field(default_factory=Narrative, init=False, repr=False)
-    _left_out: int = field(default=0, init=False, repr=False)
+    _events_left_out: int = field(default=0, init=False, repr=False)
     _alerts: dict[int, Alert] = field(default_factory=dict, init=False, repr=False)
-    _subjects: dict[int, ReportedObject] = field(default_factory=dict, init=False, repr=False)
+    _objects: dict[int, ReportedObject] = field(default_factory=dict, init=False, repr=False)
     _matches: dict[int, tuple[float, tuple[MatchRow, ...]]] = field(
         default_factory=dict, init=False, repr=False
     )
-    _tolls: dict[str, _CostTally] = field(default_factory=dict, init=False, repr=False)
+    _costs: dict[str, _BehaviourTotals] = field(default_factory=dict, init=False, repr=False)
     _frames: int = field(default=0, init=False, repr=False)
     _last: tuple[Mind, Frame] | None = field(default=None, init=False, repr=False)
-    _last_pictured: int = field(default=-1, init=False, repr=False)
+    _last_picture_index: int = field(default=-1, init=False, repr=False)
 
     def __post_init__(self) -> None:
         if min(self.limits.samples, self.limits.key_frames) < 2:
             raise SettingsError("a report keeps at least 2 samples and 2 key frames")
-        self._samples = Thinned(self.limits.samples)
+        self._samples = EvenSample(self.limits.samples)
         self._spans = SpanRecorder(self.limits.spans)
-        self._pictures = Heaviest(self.limits.key_frames, lambda k: k.weight)
+        self._pictures = TopWeighted(self.limits.key_frames, lambda k: k.weight)
 
     def add(self, step: Step, frame: Frame) -> None:
         """Add one step.
@@ -113,20 +113,20 @@ class Collector:
         mind = step.mind
         self._frames += 1
         self._last = mind, frame
-        self._remember_subjects(mind)
-        self._remember_alerts(step.alerts + mind.alerts)
-        self._remember_matches(step)
-        self._remember_tolls(step)
-        told, events = self._narrative.lines(step, frame), worded_once(step.events)
+        self._record_objects(mind)
+        self._record_alerts(step.alerts + mind.alerts)
+        self._record_matches(step)
+        self._add_costs(step)
+        lines, events = self._narrative.lines(step, frame), worded_once(step.events)
         room = max(0, self.limits.events - len(self._events))
-        self._events.extend(told[:room])
-        self._left_out += max(0, len(told) - room)
-        self._spans.note(step.time, state_of(mind))
+        self._events.extend(lines[:room])
+        self._events_left_out += max(0, len(lines) - room)
+        self._spans.record(step.time, state_of(mind))
         self._samples.offer(lambda: sample_of(mind))
-        weight = weight_of(step.events) if self._frames > 1 else ENDS_WEIGHT
-        if weight and self._pictures.has_room_for(weight):
+        weight = weight_of(step.events) if self._frames > 1 else LAST_FRAME_WEIGHT
+        if weight and self._pictures.would_keep(weight):
             self._pictures.add(self._picture(mind, frame, events, weight))
-            self._last_pictured = frame.index
+            self._last_picture_index = frame.index
 
     def save(self) -> Mapping[str, Any]:
         """The state of the collector; see `visup.agent.storage.checkpoint`."""
@@ -149,7 +149,7 @@ class Collector:
         problem: str | None = None,
         notes: Sequence[str] = (),
         events: Sequence[Event] = (),
-        courses: Sequence[Branch] = (),
+        task_trees: Sequence[Branch] = (),
     ) -> RunData:
         """The collected data at the end of the run.
 
@@ -159,16 +159,16 @@ class Collector:
             problem: Why the source ended early (`Source.problem`).
             notes: Assumptions made (`Source.notes`).
             events: Events after the last step.
-            courses: The trees of the tasks (`visup.tasks.tools.outline`).
+            task_trees: The trees of the tasks (`visup.tasks.tools.outline`).
 
         Returns:
             The input of `write_report`.
         """
         mind, frame = self._last or (Mind(), None)
         pictures = self._pictures.items()
-        rest = self._narrative.rest(mind.time, mind.frame_index)
-        if frame is not None and frame.index != self._last_pictured:
-            pictures += (self._picture(mind, frame, (), ENDS_WEIGHT),)
+        remaining = self._narrative.rest(mind.time, mind.frame_index)
+        if frame is not None and frame.index != self._last_picture_index:
+            pictures += (self._picture(mind, frame, (), LAST_FRAME_WEIGHT),)
         return RunData(
             source=str((facts or {}).get("source", "the video")),
             verdict=verdict,
@@ -176,51 +176,51 @@ class Collector:
             frames=self._frames,
             duration=mind.time,
             tasks=mind.tasks,
-            events=(*self._events, *rest, *events),
-            events_left_out=self._left_out,
+            events=(*self._events, *remaining, *events),
+            events_left_out=self._events_left_out,
             alerts=tuple(a for _, a in sorted(self._alerts.items())),
-            objects=tuple(s for _, s in sorted(self._subjects.items())),
+            objects=tuple(s for _, s in sorted(self._objects.items())),
             samples=self._samples.items(),
             spans=self._spans.spans(mind.time),
             key_frames=tuple(sorted(pictures, key=lambda k: k.time)),
-            efforts=tuple(
+            behaviour_costs=tuple(
                 BehaviourCost(name, t.runs, t.failures, t.total_ms / max(1, t.runs))
-                for name, t in self._tolls.items()
+                for name, t in self._costs.items()
             ),
             facts=dict(facts or {}),
             problem=problem,
             notes=tuple(notes),
-            courses=tuple(courses),
+            task_trees=tuple(task_trees),
         )
 
-    def _remember_subjects(self, mind: Mind) -> None:
+    def _record_objects(self, mind: Mind) -> None:
         for b in mind.objects.values():
-            if b.confirmed and (b.id in self._subjects or len(self._subjects) < self.limits.spans):
-                self._subjects[b.id] = ReportedObject(
+            if b.confirmed and (b.id in self._objects or len(self._objects) < self.limits.spans):
+                self._objects[b.id] = ReportedObject(
                     b.id, role_or_model(mind, b.name), b.strength, b.first_seen, b.last_seen
                 )
 
-    def _remember_alerts(self, alerts: Sequence[Alert]) -> None:
+    def _record_alerts(self, alerts: Sequence[Alert]) -> None:
         for a in alerts:
             if a.id in self._alerts or len(self._alerts) < self.limits.alerts:
                 self._alerts[a.id] = a
 
-    def _remember_matches(self, step: Step) -> None:
+    def _record_matches(self, step: Step) -> None:
         """The latest matches of visible regions; the shape matcher may not run on each frame."""
-        seen = {r.id for r in step.observation.of("region")}
+        visible = {r.id for r in step.observation.of("region")}
         found = matches_of(step.observation.of("hypothesis"))
-        self._matches = {k: v for k, v in self._matches.items() if k in seen or k in found}
+        self._matches = {k: v for k, v in self._matches.items() if k in visible or k in found}
         self._matches.update({k: (step.time, v) for k, v in found.items()})
 
-    def _remember_tolls(self, step: Step) -> None:
+    def _add_costs(self, step: Step) -> None:
         for r in step.reports:
-            toll = self._tolls.setdefault(r.behaviour, _CostTally())
-            toll.runs += r.state is ReportState.RAN
-            toll.failures += r.state is ReportState.FAILED
-            toll.total_ms += r.elapsed_ms if r.state is ReportState.RAN else 0.0
+            totals = self._costs.setdefault(r.behaviour, _BehaviourTotals())
+            totals.runs += r.state is ReportState.RAN
+            totals.failures += r.state is ReportState.FAILED
+            totals.total_ms += r.elapsed_ms if r.state is ReportState.RAN else 0.0
 
     def _picture(self, mind: Mind, frame: Frame, events: Sequence[Event], weight: int) -> KeyFrame:
-        drawn = shrunk(annotate(frame.image, mind), PICTURE_WIDTH)
+        drawn = shrunk(annotate(frame.image, mind), MAX_PICTURE_WIDTH)
         return KeyFrame(
             frame_index=frame.index,
             time=mind.time,
@@ -228,16 +228,18 @@ class Collector:
             size=(drawn.shape[1], drawn.shape[0]),
             captions=tuple(e.text for e in events),
             weight=weight,
-            looks=tuple(self._looks(mind, frame)),
+            closeups=tuple(self._closeups(mind, frame)),
         )
 
-    def _looks(self, mind: Mind, frame: Frame) -> list[RegionCloseup]:
+    def _closeups(self, mind: Mind, frame: Frame) -> list[RegionCloseup]:
         # The region of an object not seen now is only a prediction: no picture of it.
-        seen = [b for b in mind.present() if b.last_seen == mind.time]
-        largest = sorted(seen, key=lambda b: -b.region.area)[:MOST_LOOKS]
-        looks = []
+        visible = [b for b in mind.present() if b.last_seen == mind.time]
+        largest = sorted(visible, key=lambda b: -b.region.area)[:MAX_CLOSEUPS]
+        closeups = []
         for b in sorted(largest, key=lambda b: b.id):
-            at, matches = self._matches.get(b.region.id, (mind.time, ()))
-            picture = jpeg_of(cut_out(frame.image, b))
-            looks.append(RegionCloseup(b.region.id, b.id, b.name, b.strength, picture, matches, at))
-        return looks
+            matched_at, matches = self._matches.get(b.region.id, (mind.time, ()))
+            picture = jpeg_of(object_crop(frame.image, b))
+            closeups.append(
+                RegionCloseup(b.region.id, b.id, b.name, b.strength, picture, matches, matched_at)
+            )
+        return closeups

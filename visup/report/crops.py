@@ -10,11 +10,11 @@ from visup.agent import (
     ObjectBelief,
 )
 
-LOOK_SIZE = 112
+CROP_SIZE = 112
 JPEG_QUALITY = 82
 
 
-def cut_out(image: NDArray[np.uint8], belief: ObjectBelief) -> NDArray[np.uint8]:
+def object_crop(image: NDArray[np.uint8], belief: ObjectBelief) -> NDArray[np.uint8]:
     """A crop of an object with a dimmed margin.
 
     Args:
@@ -22,7 +22,7 @@ def cut_out(image: NDArray[np.uint8], belief: ObjectBelief) -> NDArray[np.uint8]
         belief: An object visible in it.
 
     Returns:
-        (h, w, 3) uint8 BGR, its longer side at most `LOOK_SIZE` pixels.
+        (h, w, 3) uint8 BGR, its longer side at most `CROP_SIZE` pixels.
     """
     x, y, w, h = belief.region.bbox
     margin = max(4, round(0.12 * max(w, h)))
@@ -31,10 +31,10 @@ def cut_out(image: NDArray[np.uint8], belief: ObjectBelief) -> NDArray[np.uint8]
     inside = belief.region.full_mask((image.shape[1], image.shape[0]))[y0:y1, x0:x1, None]
     part = image[y0:y1, x0:x1]
     dimmed = np.where(inside, part, part // 4)
-    scale = LOOK_SIZE / max(part.shape[:2])
+    scale = CROP_SIZE / max(part.shape[:2])
     size = (max(1, round(part.shape[1] * scale)), max(1, round(part.shape[0] * scale)))
-    way = cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC
-    return np.asarray(cv2.resize(dimmed, size, interpolation=way), np.uint8)
+    interpolation = cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC
+    return np.asarray(cv2.resize(dimmed, size, interpolation=interpolation), np.uint8)
 
 
 def shrunk(image: NDArray[np.uint8], width: int) -> NDArray[np.uint8]:

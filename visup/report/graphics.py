@@ -27,7 +27,7 @@ COLOURS = 128
 CHUNK = 4096
 """Maximum characters per message in kitty's protocol."""
 
-WIDEST_PX = 1000
+MAX_WIDTH_PX = 1000
 
 
 class Graphics(StrEnum):
@@ -48,9 +48,9 @@ def graphics_of(environment: Mapping[str, str] = os.environ) -> Graphics:
     >>> graphics_of({"TERM": "xterm-kitty"}), graphics_of({"TERM": "foot"}), graphics_of({"TERM": "xterm"})
     (<Graphics.KITTY: 'kitty'>, <Graphics.SIXEL: 'sixel'>, <Graphics.TEXT: 'text'>)
     """
-    wanted = environment.get("VISUP_GRAPHICS", "").lower()
-    if wanted in tuple(Graphics):
-        return Graphics(wanted)
+    requested = environment.get("VISUP_GRAPHICS", "").lower()
+    if requested in tuple(Graphics):
+        return Graphics(requested)
     term = environment.get("TERM", "").lower()
     if term.startswith(("tmux", "screen")):
         return Graphics.TEXT  # multiplexers pass on neither protocol
@@ -73,7 +73,7 @@ def terminal_picture(
     graphics = graphics or graphics_of()
     if graphics is Graphics.TEXT:
         return text_picture(image, columns)
-    small = _no_wider(image)
+    small = _limited_width(image)
     codes = kitty_codes(small) if graphics is Graphics.KITTY else sixel_codes(small)
     # Rich writes control segments unchanged, and only to terminals.
     return Segments([Segment(codes, None, [(ControlType.BELL,)]), Segment.line()])
@@ -87,11 +87,11 @@ def kitty_codes(image: Image) -> str:
     """
     data = b64encode(png(image)).decode()
     pieces = [data[n : n + CHUNK] for n in range(0, len(data), CHUNK)]
-    told = (
+    messages = (
         f"\x1b_G{'a=T,f=100,' if n == 0 else ''}m={int(n < len(pieces) - 1)};{piece}\x1b\\"
         for n, piece in enumerate(pieces)
     )
-    return "".join(told)
+    return "".join(messages)
 
 
 def sixel_codes(image: Image) -> str:
@@ -101,13 +101,13 @@ def sixel_codes(image: Image) -> str:
         image: (H, W, 3) uint8 BGR.
     """
     picture = Pillow.fromarray(np.ascontiguousarray(image[:, :, ::-1])).quantize(COLOURS)
-    places = np.asarray(picture)
+    indices = np.asarray(picture)
     palette = np.asarray(picture.getpalette(), int).reshape(-1, 3)
-    height, width = places.shape
+    height, width = indices.shape
     colours = "".join(
         f"#{n};2;{r};{g};{b}" for n, (r, g, b) in enumerate((palette * 100 + 127) // 255)
     )
-    bands = "-".join(_band(places[top : top + 6]) for top in range(0, height, 6))
+    bands = "-".join(_band(indices[top : top + 6]) for top in range(0, height, 6))
     return f'\x1bPq"1;1;{width};{height}{colours}{bands}\x1b\\'
 
 
@@ -132,9 +132,9 @@ def _runs(codes: list[int]) -> Iterator[str]:
         begin = end
 
 
-def _no_wider(image: Image) -> Image:
+def _limited_width(image: Image) -> Image:
     height, width = image.shape[:2]
-    if width <= WIDEST_PX:
+    if width <= MAX_WIDTH_PX:
         return image
-    size = WIDEST_PX, round(height * WIDEST_PX / width)
+    size = MAX_WIDTH_PX, round(height * MAX_WIDTH_PX / width)
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)

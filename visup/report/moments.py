@@ -20,11 +20,11 @@ from visup.report.records import (
 )
 from visup.rules.geometry.outlines import outline_gap
 
-BEST_MATCHES = 5
-MOST_SUBJECTS = 8
-MOST_PAIRED = 5
-MOST_CANDIDATES = 8
-MOVES = ("converging", "diverging", "keeping_distance")
+MAX_MATCHES = 5
+MAX_OBJECTS = 8
+MAX_PAIRED = 5
+MAX_CANDIDATES = 8
+MOTION_RELATIONS = ("converging", "diverging", "keeping_distance")
 KIND_WEIGHTS: Mapping[str, int] = {
     "verdict": 6,
     "stage_failing": 6,
@@ -53,16 +53,16 @@ def sample_of(mind: Mind) -> Sample:
     Distances are those of the relation 'distance' if rules report it, else the gap between the outlines of
     two visible objects.
     """
-    objects = sorted(mind.present(), key=lambda b: -b.region.area)[:MOST_SUBJECTS]
+    objects = sorted(mind.present(), key=lambda b: -b.region.area)[:MAX_OBJECTS]
     votes = {
-        b.id: {c.name: c.votes for c in b.candidates[:MOST_CANDIDATES]}
+        b.id: {c.name: c.votes for c in b.candidates[:MAX_CANDIDATES]}
         for b in objects
         if b.candidates
     }
-    pairs = itertools.combinations(sorted(objects[:MOST_PAIRED], key=lambda b: b.id), 2)
+    pairs = itertools.combinations(sorted(objects[:MAX_PAIRED], key=lambda b: b.id), 2)
     distances = {(a.id, b.id): _distance(mind, a, b) for a, b in pairs}
     likely = {
-        b.id: {c.name: c.confidence for c in b.candidates[:MOST_CANDIDATES]}
+        b.id: {c.name: c.confidence for c in b.candidates[:MAX_CANDIDATES]}
         for b in objects
         if b.candidates
     }
@@ -71,9 +71,9 @@ def sample_of(mind: Mind) -> Sample:
 
 
 def _distance(mind: Mind, a: ObjectBelief, b: ObjectBelief) -> Distance | None:
-    told = mind.relation("distance", a.id, b.id)
-    if told is not None and told.value is not None:
-        return Distance(told.value, told.sigma)
+    relation = mind.relation("distance", a.id, b.id)
+    if relation is not None and relation.value is not None:
+        return Distance(relation.value, relation.sigma)
     if not (a.presence is b.presence is Presence.SEEN):
         return None
     gap = outline_gap(a.region, b.region, math.inf)
@@ -82,26 +82,26 @@ def _distance(mind: Mind, a: ObjectBelief, b: ObjectBelief) -> Distance | None:
 
 def state_of(mind: Mind) -> dict[tuple[str, ...], str]:
     """The values of the timelines: stages, relations of pairs, objects in view."""
-    now: dict[tuple[str, ...], str] = {}
+    values: dict[tuple[str, ...], str] = {}
     for task in mind.tasks:
-        now |= {("stage", task.task, s.stage): s.status.value for s in task.stages}
+        values |= {("stage", task.task, s.stage): s.status.value for s in task.stages}
     for belief in mind.present():
-        now["presence", str(belief.id)] = belief.presence.value
-    for relation in mind.holding(*MOVES):
+        values["presence", str(belief.id)] = belief.presence.value
+    for relation in mind.holding(*MOTION_RELATIONS):
         if len(relation.objects) == 2:
             low, high = sorted(relation.objects)
-            now["relation", str(low), str(high)] = relation.name
+            values["relation", str(low), str(high)] = relation.name
     for coupling in mind.couplings:
         low, high = coupling.objects
-        now["relation", str(low), str(high)] = "coupled"
-    return now
+        values["relation", str(low), str(high)] = "coupled"
+    return values
 
 
 def matches_of(hypotheses: Sequence[Hypothesis]) -> dict[int, tuple[MatchRow, ...]]:
     """The most similar views of each region, best first."""
     found: dict[int, list[MatchRow]] = {}
     for h in sorted(hypotheses, key=lambda h: (-h.similarity, h.name, h.view)):
-        held = found.setdefault(h.region_id, [])
-        if len(held) < BEST_MATCHES:
-            held.append(MatchRow(h.name, h.view, h.similarity))
+        rows = found.setdefault(h.region_id, [])
+        if len(rows) < MAX_MATCHES:
+            rows.append(MatchRow(h.name, h.view, h.similarity))
     return {region: tuple(matches) for region, matches in found.items()}

@@ -108,7 +108,7 @@ class KeyFrame:
         size: (width, height) of the picture, pixels.
         captions: Sentences of the events at that frame.
         weight: Its importance; if there are too many key frames, the lightest are dropped.
-        looks: The visible regions.
+        closeups: The visible regions.
     """
 
     frame_index: int
@@ -117,7 +117,7 @@ class KeyFrame:
     size: tuple[int, int]
     captions: tuple[str, ...]
     weight: int
-    looks: tuple[RegionCloseup, ...] = ()
+    closeups: tuple[RegionCloseup, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,13 +174,13 @@ class RunData:
         samples: Evenly spaced samples.
         spans: Spans of stages, relations and presences.
         key_frames: Key frames by time.
-        efforts: Cost of each behaviour.
+        behaviour_costs: Cost of each behaviour.
         clock: Wall clock of the run, if known.
         facts: Further facts about the run, in the order to show them: settings, versions, timing;
             values may be nested mappings and lists.
         problem: Why the source ended early, or None.
         notes: Sentences about assumptions.
-        courses: The tree of each task.
+        task_trees: The tree of each task.
         videos: Names of the annotated videos next to the report, in order.
     """
 
@@ -197,12 +197,12 @@ class RunData:
     samples: tuple[Sample, ...] = ()
     spans: tuple[StateSpan, ...] = ()
     key_frames: tuple[KeyFrame, ...] = ()
-    efforts: tuple[BehaviourCost, ...] = ()
+    behaviour_costs: tuple[BehaviourCost, ...] = ()
     facts: Mapping[str, Any] = field(default_factory=empty)
     clock: WallClock = field(default_factory=WallClock)
     problem: str | None = None
     notes: tuple[str, ...] = ()
-    courses: tuple[Branch, ...] = ()
+    task_trees: tuple[Branch, ...] = ()
     videos: tuple[str, ...] = ()
 
     def spans_about(self, kind: str) -> tuple[StateSpan, ...]:

@@ -28,16 +28,16 @@ def spotlight(image: NDArray[np.uint8], regions: Iterable[Region]) -> NDArray[np
     Returns:
         (H, W, 3) uint8 BGR, a new image.
     """
-    made = (image * DIMMED).astype(np.uint8)
+    result = (image * DIMMED).astype(np.uint8)
     listed = sorted({r.id: r for r in regions}.values(), key=lambda r: r.id)
     for region in listed:
         x, y, w, h = region.bbox
-        lit = made[y : y + h, x : x + w]
-        lit[region.mask] = image[y : y + h, x : x + w][region.mask]
+        bright_part = result[y : y + h, x : x + w]
+        bright_part[region.mask] = image[y : y + h, x : x + w][region.mask]
     for region in listed:
         colour = object_colour(region.id)
         outline = np.round(region.contour).astype(np.int32).reshape(-1, 1, 2)
-        cv2.polylines(made, [outline], True, colour[::-1], 2, cv2.LINE_AA)
+        cv2.polylines(result, [outline], True, colour[::-1], 2, cv2.LINE_AA)
         at = (region.bbox[0], max(0, region.bbox[1] - LETTERS - 6))
-        write(made, f"region {region.id}", at, LETTERS, colour)
-    return made
+        write(result, f"region {region.id}", at, LETTERS, colour)
+    return result

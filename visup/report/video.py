@@ -17,7 +17,7 @@ from visup.percepts.opencv_names import opencv_name
 from visup.percepts.video.quiet_decoder import quiet
 from visup.report.annotate import annotate
 
-MOST_WIDTH = 960
+MAX_WIDTH = 960
 FOURCC = "VP80"
 
 
@@ -29,13 +29,13 @@ class WebmWriter:
     Args:
         path: The file to write, `.webm`.
         fps: Frames per second to play, more than 0.
-        most_width: Wider pictures are reduced to it, pixels.
+        max_width: Wider pictures are reduced to it, pixels.
     """
 
-    def __init__(self, path: Path, fps: float, most_width: int = MOST_WIDTH) -> None:
+    def __init__(self, path: Path, fps: float, max_width: int = MAX_WIDTH) -> None:
         self.path = path
         self.fps = fps
-        self._most_width = most_width
+        self._max_width = max_width
         self._size: tuple[int, int] | None = None
         self._writer: cv2.VideoWriter | None = None
 
@@ -49,7 +49,7 @@ class WebmWriter:
             OutputError: The file cannot be written.
         """
         if self._writer is None:
-            self._size = playable_size(image.shape[1], image.shape[0], self._most_width)
+            self._size = playable_size(image.shape[1], image.shape[0], self._max_width)
             self._writer = self._opened(self._size)
         if self._size is not None and (image.shape[1], image.shape[0]) != self._size:
             image = np.asarray(
@@ -106,16 +106,16 @@ class AnnotatedVideo(WebmWriter):
         self.write(annotate(frame.image, step.mind))
 
 
-def playable_size(width: int, height: int, most: int = MOST_WIDTH) -> tuple[int, int]:
+def playable_size(width: int, height: int, max_width: int = MAX_WIDTH) -> tuple[int, int]:
     """The size of the video: limited width, same aspect ratio, sides even and at least 16.
 
     Args:
         width: Width of the frames, pixels.
         height: Height of the frames, pixels.
-        most: Maximum width, pixels.
+        max_width: Maximum width, pixels.
 
     Returns:
         (width, height), pixels.
     """
-    scale = min(1.0, most / width)
+    scale = min(1.0, max_width / width)
     return max(16, round(width * scale / 2) * 2), max(16, round(height * scale / 2) * 2)

@@ -83,7 +83,7 @@ class Recorder:
         self.notes = source.notes
         self.complete = True
         self.collector = Collector()
-        self._courses = [outline(t) for name in settings.tasks for t in load_tasks(name)]
+        self._task_trees = [outline(t) for name in settings.tasks for t in load_tasks(name)]
         path = free_path(folder / "annotated.webm")
         self.video = AnnotatedVideo(path, source.fps / source.every) if options.video else None
         self._wants_report = options.report
@@ -232,7 +232,7 @@ class Recorder:
             self.facts,
             problem=result.problem,
             notes=self.notes,
-            courses=self._courses,
+            task_trees=self._task_trees,
         )
         videos = self.folder.glob("annotated*.webm")
         # In the order of writing: `annotated.webm`, `annotated-2.webm`, ...

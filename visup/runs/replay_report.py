@@ -86,9 +86,9 @@ class ReplayReport:
         """
         from visup.report.page.html import write_report
 
-        courses = [outline(t) for name in self._settings.tasks for t in load_tasks(name)]
+        task_trees = [outline(t) for name in self._settings.tasks for t in load_tasks(name)]
         collected = self._collector.finish(
-            verdict, self._facts, problem=None, notes=self.notes, courses=courses
+            verdict, self._facts, problem=None, notes=self.notes, task_trees=task_trees
         )
         try:
             write_report(collected, folder / "report.html")

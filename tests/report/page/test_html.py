@@ -185,18 +185,18 @@ def test_what_the_user_wrote_cannot_run() -> None:
             replace(
                 k,
                 captions=(EVIL,),
-                looks=tuple(
+                closeups=tuple(
                     replace(
                         look,
                         believed=EVIL,
                         matches=tuple(replace(m, name=EVIL) for m in look.matches),
                     )
-                    for look in k.looks
+                    for look in k.closeups
                 ),
             )
             for k in evil.key_frames
         ),
-        efforts=tuple(replace(e, behaviour=EVIL) for e in evil.efforts),
+        behaviour_costs=tuple(replace(e, behaviour=EVIL) for e in evil.behaviour_costs),
     )
     attacked = Page(report_page(evil))
     assert attacked.faults == []

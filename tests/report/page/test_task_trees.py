@@ -16,7 +16,7 @@ from tests.report.scene import run
 from visup.agent import Status
 from visup.report.collector import Collector
 from visup.report.page.html import report_page
-from visup.report.page.task_trees import changes, courses
+from visup.report.page.task_trees import stage_changes, task_trees
 from visup.report.records import RunData, StateSpan
 from visup.tasks.checks.load import parse_task
 from visup.tasks.tools.outline import Branch, outline
@@ -32,7 +32,7 @@ def scene() -> RunData:
     collector = Collector()
     for step, frame in run((160, 120), "dock"):
         collector.add(step, frame)
-    return collector.finish(courses=[outline(parse_task(DOCK))])
+    return collector.finish(task_trees=[outline(parse_task(DOCK))])
 
 
 def told(html: str) -> list[tuple[str, str, list[list[object]]]]:
@@ -43,13 +43,13 @@ def told(html: str) -> list[tuple[str, str, list[list[object]]]]:
 
 def test_each_stage_ends_in_the_colour_in_which_the_task_ended() -> None:
     ended = {s.stage: s.status.value for s in scene().tasks[0].stages}
-    shown = told(courses(scene()))
+    shown = told(task_trees(scene()))
     assert {stage: status for status, stage, _ in shown} == ended
     assert len(shown) == len(ended)
 
 
 def test_the_slider_has_every_change_of_the_run() -> None:
-    for _, stage, steps in told(courses(scene())):
+    for _, stage, steps in told(task_trees(scene())):
         spans = [s for s in scene().spans if s.subject == ("stage", "dock", stage)]
         assert [value for _, value in steps] == [s.value for s in spans]
         times = [float(str(since)) for since, _ in steps]
@@ -61,7 +61,7 @@ def test_the_slider_has_every_change_of_the_run() -> None:
 def test_changes_come_in_order_and_of_one_stage_only(moments: list[tuple[float, Status]]) -> None:
     spans = [StateSpan(("stage", "t", "a"), s.value, at, at + 1) for at, s in moments]
     other = StateSpan(("stage", "t", "b"), "done", 0, 1)
-    found = changes(RunData("x", spans=(*spans, other)), "t", "a")
+    found = stage_changes(RunData("x", spans=(*spans, other)), "t", "a")
     assert [t for t, _ in found] == sorted(t for t, _ in found)
     assert sorted(v for _, v in found) == sorted(s.value for s in spans)
 
@@ -69,10 +69,10 @@ def test_changes_come_in_order_and_of_one_stage_only(moments: list[tuple[float, 
 def test_what_a_file_says_is_never_read_as_markup() -> None:
     evil = "<script>alert(1)</script>\"'"
     tree = Branch(evil, "task", "", (Branch(evil, "stage", evil), Branch(evil, "words", evil)))
-    data = RunData("x", spans=(StateSpan(("stage", evil, evil), "done", 0, 1),), courses=(tree,))
+    data = RunData("x", spans=(StateSpan(("stage", evil, evil), "done", 0, 1),), task_trees=(tree,))
     page = report_page(data)
     assert "<script>alert" not in page
-    assert told(courses(data)) == [("done", unescape(_escaped(evil)), [[0, "done"]])]
+    assert told(task_trees(data)) == [("done", unescape(_escaped(evil)), [[0, "done"]])]
 
 
 def _escaped(text: str) -> str:
@@ -80,4 +80,4 @@ def _escaped(text: str) -> str:
 
 
 def test_without_a_task_nothing_is_drawn() -> None:
-    assert courses(replace(scene(), courses=())) == ""
+    assert task_trees(replace(scene(), task_trees=())) == ""

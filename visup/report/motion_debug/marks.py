@@ -17,8 +17,8 @@ Floats = NDArray[np.floating]
 WHITE: Rgb = (255, 255, 255)
 INK: Rgb = (14, 18, 25)
 SUBPIXEL = 4  # fractional bits of OpenCV's coordinates: without them short arrows point in wrong directions
-FASTEST = 250.0  # pixels per second of full saturation
-LETTERS = 13
+SATURATED_SPEED = 250.0  # pixels per second of full saturation
+LETTER_PX = 13
 
 
 def arrow(
@@ -38,14 +38,14 @@ def arrow(
     if length < 1.0:
         cv2.circle(image, _fixed(start), 20, colour[::-1], -1, cv2.LINE_AA, SUBPIXEL)
         return
-    way = along * min(1.0, longest / length)
-    shown = float(np.hypot(*way))
-    line(image, start, start + way, colour, width)
-    barb = min(0.4 * shown, 3.0 + 1.5 * width)
-    back = -way / shown
+    vector = along * min(1.0, longest / length)
+    drawn_length = float(np.hypot(*vector))
+    line(image, start, start + vector, colour, width)
+    barb = min(0.4 * drawn_length, 3.0 + 1.5 * width)
+    back = -vector / drawn_length
     side = np.array([-back[1], back[0]])
     for turn in (-0.5, 0.5):
-        line(image, start + way, start + way + barb * (back + turn * side), colour, width)
+        line(image, start + vector, start + vector + barb * (back + turn * side), colour, width)
 
 
 def line(image: Image, start: Floats, end: Floats, colour: Rgb, width: int = 1) -> None:
@@ -70,7 +70,7 @@ def flow_colours(velocity: Floats) -> NDArray[np.float32]:
     speed = np.hypot(velocity[:, 0], velocity[:, 1])
     hue = np.degrees(np.arctan2(velocity[:, 1], velocity[:, 0])) % 360
     # Speeds span four orders of magnitude, hence the logarithm.
-    strength = np.clip(np.log1p(speed) / np.log1p(FASTEST), 0, 1)
+    strength = np.clip(np.log1p(speed) / np.log1p(SATURATED_SPEED), 0, 1)
     hsv = np.stack([hue, strength, np.ones_like(hue)], axis=1).astype(np.float32)[None]
     return np.asarray(cv2.cvtColor(hsv, cv2.COLOR_HSV2BGR)[0] * 255, np.float32)
 
@@ -78,15 +78,15 @@ def flow_colours(velocity: Floats) -> NDArray[np.float32]:
 def wheel(image: Image, centre: tuple[int, int], radius: int) -> None:
     """The legend of `flow_colours`: each direction in its colour, in place."""
     ys, xs = np.mgrid[-radius : radius + 1, -radius : radius + 1]
-    reach = np.hypot(xs, ys) / radius
-    way = np.stack([xs, ys], axis=-1).reshape(-1, 2).astype(np.float32)
-    speed = np.expm1(np.clip(reach, 0, 1) * np.log1p(FASTEST)).reshape(-1, 1)
-    unit = way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-6)
-    colours = flow_colours((unit * speed).astype(np.float32)).reshape(*reach.shape, 3)
+    radii = np.hypot(xs, ys) / radius
+    direction = np.stack([xs, ys], axis=-1).reshape(-1, 2).astype(np.float32)
+    speed = np.expm1(np.clip(radii, 0, 1) * np.log1p(SATURATED_SPEED)).reshape(-1, 1)
+    unit = direction / np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-6)
+    colours = flow_colours((unit * speed).astype(np.float32)).reshape(*radii.shape, 3)
     x, y = centre[0] - radius, centre[1] - radius
     part = image[y : y + 2 * radius + 1, x : x + 2 * radius + 1]
-    if part.shape[:2] == reach.shape:
-        part[reach <= 1] = colours[reach <= 1].astype(np.uint8)
+    if part.shape[:2] == radii.shape:
+        part[radii <= 1] = colours[radii <= 1].astype(np.uint8)
 
 
 def hatched(shape: tuple[int, int]) -> NDArray[np.bool_]:
@@ -106,17 +106,17 @@ def heading(width: int, title: str, legend: Sequence[tuple[str, Rgb]]) -> Image:
     Returns:
         (H, width, 3) uint8 BGR.
     """
-    strip = np.zeros((LETTERS * 2, width, 3), np.uint8)
+    strip = np.zeros((LETTER_PX * 2, width, 3), np.uint8)
     strip[:] = INK[::-1]
-    title = fitted(title, LETTERS + 1, width - 12)
-    write(strip, title, (6, 4), LETTERS + 1, WHITE)
-    x, least = width - 6, ink(title, LETTERS + 1).shape[1] + 16 if title else 6
+    title = fitted(title, LETTER_PX + 1, width - 12)
+    write(strip, title, (6, 4), LETTER_PX + 1, WHITE)
+    x, min_x = width - 6, ink(title, LETTER_PX + 1).shape[1] + 16 if title else 6
     for words, colour in reversed(legend):
-        wide = ink(words, LETTERS - 1).shape[1]
-        if x - wide - 14 < least:
+        text_width = ink(words, LETTER_PX - 1).shape[1]
+        if x - text_width - 14 < min_x:
             break
-        x -= wide
-        write(strip, words, (x, 6), LETTERS - 1, (205, 212, 222))
+        x -= text_width
+        write(strip, words, (x, 6), LETTER_PX - 1, (205, 212, 222))
         x -= 14
         shade(strip, (x, 8, 10, 10), colour, 1)
         x -= 10
@@ -127,12 +127,12 @@ def lines_of_text(image: Image, rows: Sequence[tuple[str, Rgb]]) -> None:
     """Rows of text, each with a swatch of its colour, at the lower left of a panel, in place."""
     if not rows:
         return
-    each, room = LETTERS + 5, image.shape[1] - 34
-    texts = [fitted(words, LETTERS - 1, room) for words, _ in rows]
-    wide = max(ink(t, LETTERS - 1).shape[1] for t in texts if t) + 30
-    top = image.shape[0] - each * len(rows) - 8
-    shade(image, (0, top, wide, image.shape[0] - top), INK, 0.74)
+    row_height, max_width = LETTER_PX + 5, image.shape[1] - 34
+    texts = [fitted(words, LETTER_PX - 1, max_width) for words, _ in rows]
+    box_width = max(ink(t, LETTER_PX - 1).shape[1] for t in texts if t) + 30
+    top = image.shape[0] - row_height * len(rows) - 8
+    shade(image, (0, top, box_width, image.shape[0] - top), INK, 0.74)
     for i, (text, (_, colour)) in enumerate(zip(texts, rows, strict=True)):
-        y = top + 4 + i * each
+        y = top + 4 + i * row_height
         shade(image, (7, y + 3, 10, 10), colour, 1)
-        write(image, text, (22, y + 1), LETTERS - 1, WHITE)
+        write(image, text, (22, y + 1), LETTER_PX - 1, WHITE)

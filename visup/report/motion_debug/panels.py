@@ -38,8 +38,8 @@ from visup.report.palette import Rgb, object_colour
 
 PANEL = (640, 480)  # maximum size of a panel's picture, pixels
 ARROW_S = 0.25
-SURE = 0.75  # share of its label below which a superpixel is shown as uncertain
-MOST_ROWS = 6
+CERTAIN_SHARE = 0.75  # share of its label below which a superpixel is shown as uncertain
+MAX_ROWS = 6
 BACKGROUND: tuple[Rgb, Rgb] = ((126, 142, 164), (86, 98, 178))
 CANDIDATE: Rgb = (178, 223, 138)
 OUTLIER: Rgb = (255, 45, 85)
@@ -94,10 +94,10 @@ def _canvas(frame: Frame, trace: SegmentationTrace | None) -> Canvas:
     if image.ndim == 2 or image.shape[2] == 1:
         image = np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), np.uint8)
     width, height = frame.size
-    grow = min(PANEL[0] / width, PANEL[1] / height)
-    size = max(16, round(width * grow)), max(16, round(height * grow))
-    way = cv2.INTER_AREA if grow < 1 else cv2.INTER_CUBIC
-    shown = np.asarray(cv2.resize(image, size, interpolation=way), np.uint8)
+    factor = min(PANEL[0] / width, PANEL[1] / height)
+    size = max(16, round(width * factor)), max(16, round(height * factor))
+    interpolation = cv2.INTER_AREA if factor < 1 else cv2.INTER_CUBIC
+    shown = np.asarray(cv2.resize(image, size, interpolation=interpolation), np.uint8)
     scale = trace.scene.image.scale if trace is not None else 1.0
     return Canvas(shown, size[0] / (width * scale), scale)
 
@@ -116,14 +116,14 @@ def colour_of(track: Track) -> Rgb:
     return object_colour(track.id) if track.id > 0 else CANDIDATE
 
 
-def best_measured(trace: SegmentationTrace) -> tuple[NDArray[np.bool_], ...]:
+def longest_baseline_masks(trace: SegmentationTrace) -> tuple[NDArray[np.bool_], ...]:
     """For each baseline a mask of the shown constraints: each point on its longest baseline."""
-    taken = np.zeros(len(trace.scene.points), dtype=bool)
+    assigned = np.zeros(len(trace.scene.points), dtype=bool)
     out = []
     for m in reversed(trace.scene.measured):
-        fresh = ~taken[m.constraints.index]
-        taken[m.constraints.index] = True
-        out.append(fresh)
+        unassigned = ~assigned[m.constraints.index]
+        assigned[m.constraints.index] = True
+        out.append(unassigned)
     return tuple(reversed(out))
 
 
@@ -144,9 +144,9 @@ def explained_by(trace: SegmentationTrace, m: BaselineMotion) -> NDArray[np.int6
     for k, t in enumerate(trace.tracks, 1):
         near = cells.dilated((t.share > 0.3)[:, None], 1)[at, 0]
         parts = [distances(p, c, layer_slack(p, t.centre)) for p in t.predicted(c.lag, c.span_s)]
-        off = np.min(parts, axis=0) if parts else np.full(len(c), np.inf)
-        better = near & (off < best)
-        best, layer = np.where(better, off, best), np.where(better, k, layer)
+        distance = np.min(parts, axis=0) if parts else np.full(len(c), np.inf)
+        better = near & (distance < best)
+        best, layer = np.where(better, distance, best), np.where(better, k, layer)
     return np.where(best > OUTLIER_PX2, -1, layer)
 
 
@@ -158,7 +158,7 @@ def _constraints(canvas: Canvas, trace: SegmentationTrace | None) -> Image:
     if trace is not None:
         colours = {-1: OUTLIER, 0: BACKGROUND[0]}
         colours |= {k: colour_of(t) for k, t in enumerate(trace.tracks, 1)}
-        for m, shown in zip(trace.scene.measured, best_measured(trace), strict=True):
+        for m, shown in zip(trace.scene.measured, longest_baseline_masks(trace), strict=True):
             layer = explained_by(trace, m)
             # Independent motion is drawn last, on top.
             for i in sorted(np.flatnonzero(shown), key=lambda i: layer[i] != 0):
@@ -196,15 +196,15 @@ def velocities(trace: SegmentationTrace) -> tuple[Floats, NDArray[np.int64]]:
     models = last.background.models
     prior = last.background.prevalence.log_prior(centre, len(models))
     # Ties go to the last one, which follows the camera.
-    which = len(models) - 1 - prior[::-1].argmax(axis=0)
-    ways = np.stack([m.at(centre) for m in models]) / last.constraints.span_s
-    out = ways[which, np.arange(len(centre))]
+    model_index = len(models) - 1 - prior[::-1].argmax(axis=0)
+    background_rates = np.stack([m.at(centre) for m in models]) / last.constraints.span_s
+    out = background_rates[model_index, np.arange(len(centre))]
     for k, t in enumerate(trace.tracks, 1):
-        mine = t.share > 0.5
+        in_track = t.share > 0.5
         rate = t.best_rate()
-        if rate is not None and mine.any():
-            out[mine] = centre[mine] @ rate.matrix[:, :2].T + rate.matrix[:, 2]
-            layer[mine] = k
+        if rate is not None and in_track.any():
+            out[in_track] = centre[in_track] @ rate.matrix[:, :2].T + rate.matrix[:, 2]
+            layer[in_track] = k
     return np.asarray(out, np.float32), layer
 
 
@@ -260,18 +260,18 @@ def layer_rows(trace: SegmentationTrace) -> list[tuple[str, Rgb]]:
     for i, model in enumerate(reversed(last.background.models)):
         vx, vy = model.at(middle)[0] / last.constraints.span_s / scale
         name = "background" if i == 0 else "background, second"
-        sure = "" if last.background.sure or i else ", predicted"
-        backed = f", {_support(model.support)}" if model.support else ""
-        words = f"{name}{sure}: {vx:+.1f} {vy:+.1f} px/s{backed}"
-        rows.append((words, BACKGROUND[min(i, 1)]))
+        predicted = "" if last.background.sure or i else ", predicted"
+        support_text = f", {_support(model.support)}" if model.support else ""
+        text = f"{name}{predicted}: {vx:+.1f} {vy:+.1f} px/s{support_text}"
+        rows.append((text, BACKGROUND[min(i, 1)]))
     support = {t.key: sum(m.support for m in t.motions) for t in trace.tracks}
-    first = sorted(trace.tracks, key=lambda t: (t.id == 0, t.id or -support[t.key]))
-    rows += [(_track_words(t, support[t.key], scene.time, scale), colour_of(t)) for t in first]
-    left = len(rows) - MOST_ROWS
-    return rows if left <= 0 else [*rows[:MOST_ROWS], (f"and {left} more", UNKNOWN)]
+    ordered = sorted(trace.tracks, key=lambda t: (t.id == 0, t.id or -support[t.key]))
+    rows += [(_track_text(t, support[t.key], scene.time, scale), colour_of(t)) for t in ordered]
+    left_out = len(rows) - MAX_ROWS
+    return rows if left_out <= 0 else [*rows[:MAX_ROWS], (f"and {left_out} more", UNKNOWN)]
 
 
-def _track_words(t: Track, support: float, now: float, scale: float) -> str:
+def _track_text(t: Track, support: float, now: float, scale: float) -> str:
     name = f"{t.id} (layer {t.key})" if t.id else f"candidate (layer {t.key})"
     rate = t.best_rate()
     if rate is None:
@@ -308,18 +308,20 @@ def label_colours(trace: SegmentationTrace) -> tuple[Floats, NDArray[np.bool_]]:
     tracks = {t.key: t for t in trace.tracks}
     layers = [colour_of(tracks[key]) if key in tracks else CANDIDATE for key in trace.keys]
     colours = np.array([(0, 0, 0), *layers, UNKNOWN], np.float32)[:, ::-1]
-    share = trace.posterior
-    return np.asarray(share @ colours, np.float32), np.asarray(share.max(axis=1) < SURE)
+    posterior = trace.posterior
+    return np.asarray(posterior @ colours, np.float32), np.asarray(
+        posterior.max(axis=1) < CERTAIN_SHARE
+    )
 
 
 def _labels(canvas: Canvas, trace: SegmentationTrace | None) -> Image:
     out = canvas.ground(0.6)
     if trace is not None:
         cells = _enlarged(trace, canvas)
-        colours, unsure = label_colours(trace)
+        colours, uncertain = label_colours(trace)
         belief = (1 - trace.posterior[:, 0]).astype(np.float32)
         out = (out + 0.75 * (colours[cells] - belief[cells][..., None] * out)).astype(np.uint8)
-        out[unsure[cells] & hatched(out.shape[:2])] = 255
+        out[uncertain[cells] & hatched(out.shape[:2])] = 255
         edge = (cells != np.roll(cells, 1, 0)) | (cells != np.roll(cells, 1, 1))
         out[edge] = (out[edge] * 0.72).astype(np.uint8)
     legend = [("dark: background", (52, 60, 70)), ("unknown motion", UNKNOWN)]
@@ -345,7 +347,7 @@ def _regions(
         [] if trace is None else [t for t in trace.tracks if t.id and t.last_seen < frame.time]
     )
     rows = [(f"{t.id} remembered, not seen", object_colour(t.id)) for t in remembered]
-    lines_of_text(out, rows[:MOST_ROWS])
+    lines_of_text(out, rows[:MAX_ROWS])
     return _with_heading(out, "4 regions", [("arrow: 1 s of motion", WHITE)])
 
 
@@ -372,7 +374,7 @@ def _footer(
     if trace is not None:
         confirmed = sum(t.id > 0 for t in trace.tracks)
         words.append(f"tracks: {confirmed}, candidates: {len(trace.tracks) - confirmed}")
-        over = [m.constraints for m in trace.scene.measured]
-        words += [f"{len(c)} constraints over {c.span_s:.2f} s" for c in over]
+        constraints = [m.constraints for m in trace.scene.measured]
+        words += [f"{len(c)} constraints over {c.span_s:.2f} s" for c in constraints]
     write(strip, "   |   ".join(words), (8, 5), 13, (205, 212, 222))
     return strip

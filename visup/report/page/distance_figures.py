@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from visup.report.page.figures import MOST_FIGURES, Figure, rounded, time_layout
+from visup.report.page.figures import MAX_FIGURES, Figure, rounded, time_layout
 from visup.report.page.summary import called, span_sentence
 from visup.report.records import RunData, StateSpan
 
-MOVE_COLOURS = {"converging": "#009e73", "diverging": "#d55e00", "keeping_distance": "#8a8f98"}
-FEWEST_POINTS = 3
+TREND_COLOURS = {"converging": "#009e73", "diverging": "#d55e00", "keeping_distance": "#8a8f98"}
+MIN_POINTS = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ def fitted_lines(
     lines = []
     for span in spans:
         inside = (t >= span.start) & (t <= span.end) & (y > 0)
-        if inside.sum() < FEWEST_POINTS:
+        if inside.sum() < MIN_POINTS:
             continue
         x = t[inside] - t[inside][0]
         slope, start = np.polynomial.polynomial.polyfit(x, y[inside], 1)[::-1]
@@ -74,7 +74,7 @@ def distance_figures(run: RunData) -> list[Figure]:
             counts[pair] = counts.get(pair, 0) + 1
     moving = {tuple(map(int, s.subject[1:])) for s in run.spans_about("relation")}
     order = sorted(counts, key=lambda p: (p not in moving, -counts[p], p))
-    shown = [p for p in order if counts[p] >= FEWEST_POINTS][:MOST_FIGURES]
+    shown = [p for p in order if counts[p] >= MIN_POINTS][:MAX_FIGURES]
     return [_distance_figure(run, pair) for pair in shown]
 
 
@@ -83,29 +83,29 @@ def _distance_figure(run: RunData, pair: tuple[int, int]) -> Figure:
     points = [(t, d) for t, d in known if d is not None]
     times, gaps = [t for t, _ in points], [d.gap for _, d in points]
     subject = ("relation", str(pair[0]), str(pair[1]))
-    spans = [s for s in run.spans if s.subject == subject and s.value in MOVE_COLOURS]
+    spans = [s for s in run.spans if s.subject == subject and s.value in TREND_COLOURS]
     lines = fitted_lines(times, gaps, spans)
     traces = [*_band(points), _series(known, "distance")]
     traces += [_line_trace(line, lines[:i]) for i, line in enumerate(lines)]
     coupled = [s for s in run.spans if s.subject == subject and s.value == "coupled"]
-    told = "; ".join(
+    trends = "; ".join(
         [f"{span_sentence(x.span)} at {x.slope:+.1f} px/s" for x in lines]
         + [span_sentence(s) for s in coupled]
     )
     layout = time_layout("gap in the image, px", run, rangemode="tozero")
-    layout["shapes"] += [_shaded(s) for s in coupled]
+    layout["shapes"] += [_coupled_band(s) for s in coupled]
     names = [called(run, i) for i in pair]
     return Figure(
         f"distance-{pair[0]}-{pair[1]}",
         f"{names[0]} and {names[1]}",
         f"From {gaps[0]:.0f} px at {times[0]:.1f} s to {gaps[-1]:.0f} px at {times[-1]:.1f} s"
-        + (f"; {told}." if told else "; no lasting trend was reported."),
+        + (f"; {trends}." if trends else "; no lasting trend was reported."),
         traces,
         layout,
     )
 
 
-def _shaded(span: StateSpan) -> dict[str, Any]:
+def _coupled_band(span: StateSpan) -> dict[str, Any]:
     """A band behind the lines for the time in which a pair was coupled."""
     return {
         "type": "rect",
@@ -159,16 +159,16 @@ def _band(points: list[tuple[float, Any]]) -> list[dict[str, Any]]:
 
 
 def _line_trace(line: FigureLine, before: Sequence[FigureLine]) -> dict[str, Any]:
-    move = line.span.value
-    words = move.replace("_", " ")
+    trend = line.span.value
+    words = trend.replace("_", " ")
     return {
         "type": "scatter",
         "mode": "lines",
         "name": words,
         "legendgroup": words,
-        "showlegend": all(b.span.value != move for b in before),
+        "showlegend": all(b.span.value != trend for b in before),
         "x": [rounded(t) for t in line.times],
         "y": [rounded(line.start), rounded(line.end)],
-        "line": {"color": MOVE_COLOURS[move], "width": 4},
+        "line": {"color": TREND_COLOURS[trend], "width": 4},
         "hovertemplate": f"{words} at {line.slope:+.1f} px/s<extra></extra>",
     }

@@ -42,20 +42,20 @@ def tables_of(run: RunData) -> dict[str, list[Row]]:
 OBJECT = ("id", "name", "share", "first_seen", "last_seen")
 
 
-def _event(one: Event) -> Row:
-    severity = SEVERITY_WORDS[one.severity]
-    return {"time": one.time, "kind": one.kind, "severity": severity, "text": one.text}
+def _event(event: Event) -> Row:
+    severity = SEVERITY_WORDS[event.severity]
+    return {"time": event.time, "kind": event.kind, "severity": severity, "text": event.text}
 
 
-def _alert(run: RunData, one: Alert) -> Row:
+def _alert(run: RunData, alert: Alert) -> Row:
     return {
-        "id": one.id,
-        "kind": one.kind,
-        "severity": SEVERITY_WORDS[one.severity],
-        "opened": one.opened,
-        "closed": one.closed,
-        "objects": "; ".join(called(run, i) for i in one.objects),
-        "cause": one.cause,
+        "id": alert.id,
+        "kind": alert.kind,
+        "severity": SEVERITY_WORDS[alert.severity],
+        "opened": alert.opened,
+        "closed": alert.closed,
+        "objects": "; ".join(called(run, i) for i in alert.objects),
+        "cause": alert.cause,
     }
 
 
@@ -71,13 +71,13 @@ def _distances(run: RunData) -> Iterator[Row]:
 
 
 def _links(name: str, rows: Sequence[Row]) -> str:
-    made = {"csv": ("text/csv", csv_bytes(rows)), "parquet": (_PARQUET, parquet_bytes(rows))}
-    shown = (
+    formats = {"csv": ("text/csv", csv_bytes(rows)), "parquet": (_PARQUET, parquet_bytes(rows))}
+    links = (
         f'<a download="{name}.{kind}" href="data:{mime};base64,{_base64(data)}">{kind}</a>'
-        for kind, (mime, data) in made.items()
+        for kind, (mime, data) in formats.items()
         if data is not None
     )
-    return f"<span>{escape(name)} {' '.join(shown)}</span> "
+    return f"<span>{escape(name)} {' '.join(links)}</span> "
 
 
 _PARQUET = "application/vnd.apache.parquet"
@@ -92,11 +92,11 @@ def csv_bytes(rows: Sequence[Row]) -> bytes:
     text = StringIO()
     writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
     writer.writeheader()
-    writer.writerows({k: _harmless(v) for k, v in row.items()} for row in rows)
+    writer.writerows({k: _without_formula(v) for k, v in row.items()} for row in rows)
     return text.getvalue().encode()
 
 
-def _harmless(value: Any) -> Any:
+def _without_formula(value: Any) -> Any:
     return f"'{value}" if isinstance(value, str) and value.startswith(FORMULA) else value
 
 
@@ -106,9 +106,9 @@ def parquet_bytes(rows: Sequence[Row]) -> bytes | None:
         import pyarrow.parquet as pq
     except ModuleNotFoundError:
         return None
-    place = BytesIO()
-    pq.write_table(_arrow_table(rows), place, compression="zstd")
-    return place.getvalue()
+    buffer = BytesIO()
+    pq.write_table(_arrow_table(rows), buffer, compression="zstd")
+    return buffer.getvalue()
 
 
 def _arrow_table(rows: Sequence[Row]) -> pa.Table:

@@ -14,12 +14,12 @@ from visup.report.records import ReportedObject, RunData, StateSpan
 
 CANDIDATE_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#8a8f98")
 DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot", "solid")
-LEAST_VOTES = 0.03
+MIN_VOTES = 0.03
 """Candidates that never exceed this share of votes are left out, as in figure 9 of the paper."""
-MOST_CANDIDATES = 6
-MOST_FIGURES = 8
-MOST_ROWS = 16
-MOST_TOLD = 12
+MAX_CANDIDATES = 6
+MAX_FIGURES = 8
+MAX_ROWS = 16
+MAX_CAPTION_SPANS = 12
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ def _identified(run: RunData) -> list[ReportedObject]:
     """The objects that were matched with models, longest in view first."""
     voted = {i for s in run.samples for i in s.votes}
     subjects = [s for s in run.objects if s.id in voted]
-    longest = sorted(subjects, key=lambda s: (s.first_seen - s.last_seen, s.id))[:MOST_FIGURES]
+    longest = sorted(subjects, key=lambda s: (s.first_seen - s.last_seen, s.id))[:MAX_FIGURES]
     return sorted(longest, key=lambda s: s.id)
 
 
@@ -69,7 +69,7 @@ def _candidate_figure(run: RunData, subject: ReportedObject, series: str, word: 
         for name, value in (votes or {}).items():
             peaks[name] = max(peaks.get(name, 0.0), value)
     best = sorted(peaks, key=lambda n: (-peaks[n], n))
-    shown = [n for n in best if peaks[n] > LEAST_VOTES][:MOST_CANDIDATES] or best[:1]
+    shown = [n for n in best if peaks[n] > MIN_VOTES][:MAX_CANDIDATES] or best[:1]
     traces = [_vote_trace(samples, name, i) for i, name in enumerate(shown)]
     left_out = len(peaks) - len(shown)
     caption = f"Highest {word}: {', '.join(f'{n} {peaks[n]:.2f}' for n in shown[:3])}"
@@ -89,7 +89,7 @@ def _vote_trace(samples: list[tuple[float, Any]], name: str, i: int) -> dict[str
         "mode": "lines",
         "name": html.escape(name),
         "x": [rounded(t) for t, _ in samples],
-        "y": [_known(v, name) for _, v in samples],
+        "y": [_votes_for(v, name) for _, v in samples],
         "line": {
             "color": CANDIDATE_COLOURS[i % len(CANDIDATE_COLOURS)],
             "dash": DASHES[i % len(DASHES)],
@@ -100,7 +100,7 @@ def _vote_trace(samples: list[tuple[float, Any]], name: str, i: int) -> dict[str
     }
 
 
-def _known(votes: Mapping[str, float] | None, name: str) -> float | None:
+def _votes_for(votes: Mapping[str, float] | None, name: str) -> float | None:
     """Votes for a name; missing ones are unknown, not zero."""
     value = (votes or {}).get(name)
     return None if value is None else rounded(value)
@@ -120,7 +120,7 @@ def stage_figure(run: RunData) -> Figure | None:
 
 def presence_figure(run: RunData) -> Figure | None:
     """When each object was seen or hidden."""
-    longest = sorted(run.objects, key=lambda s: (s.first_seen - s.last_seen, s.id))[:MOST_ROWS]
+    longest = sorted(run.objects, key=lambda s: (s.first_seen - s.last_seen, s.id))[:MAX_ROWS]
     rows: dict[tuple[str, ...], str] = {
         ("presence", str(s.id)): name_of(s) for s in sorted(longest, key=lambda s: s.id)
     }
@@ -153,10 +153,12 @@ def _timeline(
         "categoryarray": [html.escape(label) for label in rows.values()],
         "automargin": True,
     }
-    told = [f"{rows[s.subject]}: {span_sentence(s)}" for s in spans if s.value != "pending"]
-    caption = "; ".join(told[:MOST_TOLD]) + ("; and more." if len(told) > MOST_TOLD else ".")
+    sentences = [f"{rows[s.subject]}: {span_sentence(s)}" for s in spans if s.value != "pending"]
+    caption = "; ".join(sentences[:MAX_CAPTION_SPANS]) + (
+        "; and more." if len(sentences) > MAX_CAPTION_SPANS else "."
+    )
     traces = [_bars([s for s in spans if s.value == v], rows, colour_of) for v in values]
-    return Figure(key, title, caption if told else "Nothing has begun.", traces, layout)
+    return Figure(key, title, caption if sentences else "Nothing has begun.", traces, layout)
 
 
 def _bars(
@@ -165,12 +167,12 @@ def _bars(
     colour_of: Callable[[StateSpan], str],
 ) -> dict[str, Any]:
     """All spans of one value; pending and hidden ones are faint."""
-    words = spans[0].value.replace("_", " ")
+    label = spans[0].value.replace("_", " ")
     faint = spans[0].value in ("pending", "hidden")
     return {
         "type": "bar",
         "orientation": "h",
-        "name": words,
+        "name": label,
         "y": [html.escape(rows[s.subject]) for s in spans],
         "base": [rounded(s.start) for s in spans],
         "x": [rounded(s.end - s.start) for s in spans],
@@ -178,7 +180,7 @@ def _bars(
         "marker": {"color": [colour_of(s) for s in spans], "opacity": 0.3 if faint else 1.0},
         "width": 0.62,
         "hovertemplate": (
-            f"%{{y}}: {words} from %{{customdata[0]:.1f}} to %{{customdata[1]:.1f}} s"
+            f"%{{y}}: {label} from %{{customdata[0]:.1f}} to %{{customdata[1]:.1f}} s"
             "<extra></extra>"
         ),
     }
@@ -186,7 +188,7 @@ def _bars(
 
 def time_layout(y_title: str, run: RunData, rangemode: str = "normal") -> dict[str, Any]:
     """The common layout of all figures: a time axis with marks for alerts."""
-    grave = [a for a in run.alerts if a.severity > Severity.INFO]
+    warnings = [a for a in run.alerts if a.severity > Severity.INFO]
     return {
         "height": 300,
         "margin": {"l": 56, "r": 16, "t": 12, "b": 76},
@@ -209,7 +211,7 @@ def time_layout(y_title: str, run: RunData, rangemode: str = "normal") -> dict[s
                 "y1": 1,
                 "line": {"color": css(SEVERITY_COLOURS[a.severity]), "width": 1.5, "dash": "dot"},
             }
-            for a in grave[:20]
+            for a in warnings[:20]
         ],
     }
 

@@ -22,7 +22,7 @@ from visup.report.page.object_table import object_table
 from visup.report.page.player import player
 from visup.report.page.shell import filled_page, write_page
 from visup.report.page.summary import title_of, verdict_words
-from visup.report.page.task_trees import courses
+from visup.report.page.task_trees import task_trees
 from visup.report.records import RunData
 from visup.wording import printable, prose
 
@@ -41,7 +41,7 @@ PARTS: Mapping[str, Callable[[RunData], str]] = MappingProxyType(
         "objects": object_table,
         "key_frames": sections.key_frames,
         "tasks": sections.tasks,
-        "courses": courses,
+        "courses": task_trees,
         "similarity": sections.similarity,
         "downloads": downloads,
         "facts": sections.run_facts,
@@ -87,11 +87,14 @@ def report_page(run: RunData) -> str:
     Raises:
         ExtraMissingError: The run has figures, and Plotly is not installed.
     """
-    made = {name: [f for f in make(run) if f] for name, (make, _) in FIGURES.items()}
-    drawn = [f for figures in made.values() for f in figures]
+    figures_of_section = {name: [f for f in make(run) if f] for name, (make, _) in FIGURES.items()}
+    all_figures = [f for figures in figures_of_section.values() for f in figures]
     body = (files("visup.report.page") / "report.html").read_text(encoding="utf-8")
     text = {name: part(run) for name, part in PARTS.items()}
-    text |= {name: sections.figures(made[name], empty) for name, (_, empty) in FIGURES.items()}
+    text |= {
+        name: sections.figures(figures_of_section[name], empty)
+        for name, (_, empty) in FIGURES.items()
+    }
     text = {name: printable(prose(words)) for name, words in text.items()}
     title = f"{text['verdict_word']}: {text['title']} (visup report)"
-    return filled_page(body, text, drawn, title, SCRIPTS)
+    return filled_page(body, text, all_figures, title, SCRIPTS)

@@ -53,7 +53,9 @@ def _closeups(run: RunData) -> dict[int, bytes]:
     """The largest picture of each object in a key frame."""
     found: dict[int, bytes] = {}
     for key in run.key_frames:
-        for look in key.looks:
-            if look.object_id is not None and len(look.jpeg) > len(found.get(look.object_id, b"")):
-                found[look.object_id] = look.jpeg
+        for closeup in key.closeups:
+            if closeup.object_id is not None and len(closeup.jpeg) > len(
+                found.get(closeup.object_id, b"")
+            ):
+                found[closeup.object_id] = closeup.jpeg
     return found

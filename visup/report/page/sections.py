@@ -22,11 +22,11 @@ from visup.report.palette import OBJECT_COLOURS, css, object_colour
 from visup.report.records import KeyFrame, RegionCloseup, RunData
 
 MARKS = {Severity.INFO: "•", Severity.WARNING: "▲", Severity.CRITICAL: "◆"}
-FEWEST_FILTERED = 4
+MIN_FILTERED = 4
 """Fewer alerts need no filter."""
 MANY_OBJECTS, FEW_FRAMES = 12, 8
 """With more than this many objects the gallery is limited to the second number of pictures."""
-MOST_COMPARED = 10
+MAX_COMPARED = 10
 """Maximum key frames in the similarity table; the journal has all hypotheses."""
 
 
@@ -57,12 +57,12 @@ def notices(run: RunData) -> str:
 
 
 def _tiles(run: RunData) -> str:
-    grave = sum(a.severity > Severity.INFO for a in run.alerts)
+    count = sum(a.severity > Severity.INFO for a in run.alerts)
     facts = {
         "duration": f"{run.duration:.1f} s",
         "frames": str(run.frames),
         "object" if len(run.objects) == 1 else "objects": str(len(run.objects)),
-        "alert" if grave == 1 else "alerts": str(grave),
+        "alert" if count == 1 else "alerts": str(count),
     }
     return f"<dl class=tiles>{''.join(_tile(k, v) for k, v in facts.items())}</dl>"
 
@@ -86,7 +86,7 @@ def narrative(run: RunData) -> str:
     if not run.events:
         return "<p class=empty>Nothing notable happened.</p>"
     shown = shown_frames(run)
-    lines = "".join(_told(run, e, nearest(shown, e)) for e in run.events)
+    lines = "".join(_event_line(run, e, nearest(shown, e)) for e in run.events)
     more = (
         f"<p class=empty>{run.events_left_out} later events are only in the journal.</p>"
         if run.events_left_out
@@ -109,7 +109,7 @@ def _time(run: RunData, seconds: float, lead: str = "") -> str:
     return f'<time datetime="{wall}" title="{wall}">{lead}{seconds:.1f} s {clock}</time>'
 
 
-def _told(run: RunData, event: Event, key: KeyFrame | None) -> str:
+def _event_line(run: RunData, event: Event, key: KeyFrame | None) -> str:
     word = SEVERITY_WORDS[event.severity]
     time = _time(run, event.time)
     mark = f'<span class=mark title="{word}" aria-label="{word}">{MARKS[event.severity]}</span>'
@@ -127,13 +127,13 @@ def alerts(run: RunData) -> str:
 
 def alert_filter(run: RunData) -> str:
     """Filters of the alert list, for properties with several values."""
-    if len(run.alerts) < FEWEST_FILTERED:
+    if len(run.alerts) < MIN_FILTERED:
         return ""
-    grave = sorted({a.severity for a in run.alerts}, reverse=True)
+    severities = sorted({a.severity for a in run.alerts}, reverse=True)
     kinds = sorted({a.kind for a in run.alerts})
     return (
         "<div class=alert-filter hidden role=search aria-label='Filter alerts'>"
-        + _choice("Severity", [(SEVERITY_WORDS[s], SEVERITY_WORDS[s]) for s in grave])
+        + _choice("Severity", [(SEVERITY_WORDS[s], SEVERITY_WORDS[s]) for s in severities])
         + _choice("Kind", [(k, k.replace("_", " ")) for k in kinds])
         + "<label><input type=checkbox> still open</label>"
         + "<input type=search placeholder='words' aria-label='Words in the alert'><output></output></div>"
@@ -150,7 +150,7 @@ def _choice(name: str, values: Iterable[tuple[str, str]]) -> str:
 def _alert(run: RunData, alert: Alert) -> str:
     word = SEVERITY_WORDS[alert.severity]
     until = "still open at the end" if alert.closed is None else f"closed at {alert.closed:.1f} s"
-    who = "; ".join(called(run, i) for i in alert.objects)
+    names = "; ".join(called(run, i) for i in alert.objects)
     opened = " data-open" if alert.closed is None else ""
     evidence = "".join(f"<li>{escape(e)}</li>" for e in alert.evidence)
     return (
@@ -159,7 +159,7 @@ def _alert(run: RunData, alert: Alert) -> str:
         f"<strong>{escape(alert.kind.replace('_', ' '))}</strong> "
         f"{_time(run, alert.opened, 'from ')}, {until}</p>"
         f"<p>{escape(alert.cause)}</p>"
-        + (f"<p class=quiet>{escape(who)}</p>" if who else "")
+        + (f"<p class=quiet>{escape(names)}</p>" if names else "")
         + (f"<p class=quiet>Evidence</p><ul class=evidence>{evidence}</ul>" if evidence else "")
         + "</li>"
     )
@@ -181,12 +181,12 @@ def shown_frames(run: RunData) -> Sequence[KeyFrame]:
 
 
 def _key_frame(run: RunData, key: KeyFrame) -> str:
-    told = "".join(f"<span>{escape(c)}</span>" for c in key.captions)
+    captions = "".join(f"<span>{escape(c)}</span>" for c in key.captions)
     return (
         f'<figure id="{_anchor(key)}" tabindex=-1><button type=button class=open '
         f'aria-label="Enlarge the picture at {key.time:.1f} s">{_image(run, key)}</button>'
         f"<figcaption><time>{key.time:.1f} s</time> <b class=quiet>frame {key.frame_index}</b>"
-        f"{told}</figcaption></figure>"
+        f"{captions}</figcaption></figure>"
     )
 
 
@@ -236,9 +236,9 @@ def _stage(stage: StageBelief) -> str:
     )
 
 
-def figures(made: Iterable[Figure | None], empty: str) -> str:
+def figures(all_figures: Iterable[Figure | None], empty: str) -> str:
     """Containers in which the page's script draws the figures, with captions."""
-    shown = [f for f in made if f is not None]
+    shown = [f for f in all_figures if f is not None]
     if not shown:
         return f"<p class=empty>{escape(empty)}</p>"
     return f"<div class=figures>{''.join(_figure(f) for f in shown)}</div>"
@@ -256,29 +256,29 @@ def _figure(figure: Figure) -> str:
 
 def similarity(run: RunData) -> str:
     """The best hypotheses for each region at key frames (paper, figure 4)."""
-    compared = [k for k in shown_frames(run) if any(look.matches for look in k.looks)]
-    heaviest = sorted(compared, key=lambda k: (-k.weight, k.time))[:MOST_COMPARED]
+    compared = [k for k in shown_frames(run) if any(closeup.matches for closeup in k.closeups)]
+    heaviest = sorted(compared, key=lambda k: (-k.weight, k.time))[:MAX_COMPARED]
     if not heaviest:
         return "<p class=empty>No region was compared with models; use --models DB.</p>"
-    return "".join(_compared(k) for k in sorted(heaviest, key=lambda k: k.time))
+    return "".join(_similarity_row(k) for k in sorted(heaviest, key=lambda k: k.time))
 
 
-def _compared(key: KeyFrame) -> str:
-    cards = "".join(_look(look, key.time) for look in key.looks)
+def _similarity_row(key: KeyFrame) -> str:
+    cards = "".join(_closeup(closeup, key.time) for closeup in key.closeups)
     return (
         f'<h3><a href="#{_anchor(key)}">{key.time:.1f} s</a> '
         f"<b class=quiet>frame {key.frame_index}</b></h3><div class=looks>{cards}</div>"
     )
 
 
-def _look(look: RegionCloseup, time: float) -> str:
-    colour = css(object_colour(look.object_id)) if look.object_id else css(OBJECT_COLOURS[0])
+def _closeup(closeup: RegionCloseup, time: float) -> str:
+    colour = css(object_colour(closeup.object_id)) if closeup.object_id else css(OBJECT_COLOURS[0])
     rows = "".join(
-        f"<tr{' class=agreed' if m.name == look.believed else ''}><td>{i}</td>"
+        f"<tr{' class=agreed' if m.name == closeup.believed else ''}><td>{i}</td>"
         f"<td>{escape(m.name)}</td><td>{m.view}</td>"
         f"<td class=bar><i style='width:{100 * min(max(m.similarity, 0), 1):.0f}%'></i>"
         f"<span>{m.similarity:.2f}</span></td></tr>"
-        for i, m in enumerate(look.matches, start=1)
+        for i, m in enumerate(closeup.matches, start=1)
     )
     table = (
         f"<table><thead><tr><th>rank<th>model<th>view<th>similarity</thead><tbody>{rows}</tbody>"
@@ -286,13 +286,13 @@ def _look(look: RegionCloseup, time: float) -> str:
         if rows
         else "<p class=quiet>No hypothesis.</p>"
     )
-    believed = f"{spoken(look.believed)} {look.share:.0%}".replace("%", " %")
-    if look.matches and abs(look.matched_at - time) > 0.05:
-        believed += f", compared at {look.matched_at:.1f} s"
+    believed = f"{spoken(closeup.believed)} {closeup.share:.0%}".replace("%", " %")
+    if closeup.matches and abs(closeup.matched_at - time) > 0.05:
+        believed += f", compared at {closeup.matched_at:.1f} s"
     return (
-        f'<div class=look style="--object:{colour}"><div class=crop><img src="{_data(look.jpeg)}" '
-        f'alt="Region {look.region_id} cut out of the frame"></div><div><p><b>Region '
-        f"{look.region_id}</b>, believed to be {escape(believed)}</p>{table}</div></div>"
+        f'<div class=look style="--object:{colour}"><div class=crop><img src="{_data(closeup.jpeg)}" '
+        f'alt="Region {closeup.region_id} cut out of the frame"></div><div><p><b>Region '
+        f"{closeup.region_id}</b>, believed to be {escape(believed)}</p>{table}</div></div>"
     )
 
 
@@ -304,7 +304,7 @@ def run_facts(run: RunData) -> str:
     table = (
         f"<div class=scroll><table class=facts><tbody>{rows}</tbody></table></div>" if rows else ""
     )
-    return table + _efforts(run) or "<p class=empty>Nothing was noted.</p>"
+    return table + _behaviour_costs(run) or "<p class=empty>Nothing was noted.</p>"
 
 
 def flat(facts: Mapping[str, Any], lead: str = "") -> list[tuple[str, str]]:
@@ -325,13 +325,13 @@ def flat(facts: Mapping[str, Any], lead: str = "") -> list[tuple[str, str]]:
     return rows
 
 
-def _efforts(run: RunData) -> str:
-    if not run.efforts:
+def _behaviour_costs(run: RunData) -> str:
+    if not run.behaviour_costs:
         return ""
     rows = "".join(
         f"<tr><th scope=row>{escape(e.behaviour)}</th><td>{e.runs}</td><td>{e.failures}</td>"
         f"<td>{e.mean_ms:.1f} ms</td></tr>"
-        for e in run.efforts
+        for e in run.behaviour_costs
     )
     return (
         "<div class=scroll><table><thead><tr><th>behaviour<th>runs<th>failures<th>mean time</thead>"

@@ -14,7 +14,7 @@ from visup.agent.model.errors import ExtraMissingError, OutputError
 from visup.agent.storage.atomic import write_atomically
 from visup.report.page.figures import Figure
 
-SAID = {
+COMMON_TEXTS = {
     "noscript": '<noscript><p class="notice">The figures need scripts to be drawn; everything else on this'
     " page, and each figure in words, is here without them.</p></noscript>",
     "whole": "Written by visup. This page is self-contained and loads nothing from the network.",
@@ -27,7 +27,7 @@ MEDIA = " media-src 'self' file:;"
 def filled_page(
     body: str,
     text: Mapping[str, str],
-    drawn: Sequence[Figure],
+    figures: Sequence[Figure],
     title: str,
     scripts: Sequence[str] = ("figures.js",),
 ) -> str:
@@ -36,23 +36,23 @@ def filled_page(
     Args:
         body: Template of the body.
         text: Placeholder -> HTML without control characters.
-        drawn: The figures of the page.
+        figures: The figures of the page.
         title: Title of the window, as HTML.
         scripts: File names in this folder; only these scripts may run.
 
     Raises:
         ExtraMissingError: There are figures, and Plotly is not installed.
     """
-    own = files("visup.report.page")
-    plotly = plotly_source() if drawn else ""
-    script = "".join((own / name).read_text(encoding="utf-8") for name in scripts)
-    filled = Template(body).substitute(text, **SAID).rstrip()
-    return Template((own / "shell.html").read_text(encoding="utf-8")).substitute(
+    folder = files("visup.report.page")
+    plotly = plotly_source() if figures else ""
+    script = "".join((folder / name).read_text(encoding="utf-8") for name in scripts)
+    filled = Template(body).substitute(text, **COMMON_TEXTS).rstrip()
+    return Template((folder / "shell.html").read_text(encoding="utf-8")).substitute(
         title=title,
         body=filled,
         media=MEDIA if "<video" in filled else "",
-        figures=embedded(drawn),
-        style=(own / "report.css").read_text(encoding="utf-8"),
+        figures=embedded(figures),
+        style=(folder / "report.css").read_text(encoding="utf-8"),
         plotly=plotly,
         script=script,
         scripts_allowed=" ".join(map(_script_hash, (plotly, script))),

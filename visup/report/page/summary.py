@@ -37,13 +37,13 @@ SEVERITY_WORDS = {
     Severity.CRITICAL: "critical",
 }
 NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
-MOST_NAMED = 4
+MAX_NAMED = 4
 
 
 def verdict_words(run: RunData) -> tuple[str, str]:
     """The verdict in a word, and its meaning."""
-    judged = run.verdict or verdict_without_task(grave_kinds(run.alerts))
-    if run.verdict is None and (run.tasks or judged or not run.frames):
+    verdict = run.verdict or verdict_without_task(grave_kinds(run.alerts))
+    if run.verdict is None and (run.tasks or verdict or not run.frames):
         return "No verdict", "The run was not judged."
     words = VERDICT_WORDS if run.tasks else VERDICT_WORDS | WITHOUT_TASK
     return words[run.verdict]
@@ -57,8 +57,13 @@ def title_of(run: RunData) -> str:
 
 def summary(run: RunData) -> str:
     """One paragraph: the source, the objects, the verdict and its reason."""
-    why = _why(run)
-    sentences = [_watched(run), _followed(run), *why, _alerted(run.alerts, why)]
+    reasons = _reasons(run)
+    sentences = [
+        _source_sentence(run),
+        _objects_sentence(run),
+        *reasons,
+        _alert_sentence(run.alerts, reasons),
+    ]
     return " ".join(s for s in sentences if s)
 
 
@@ -85,8 +90,8 @@ def span_sentence(span: StateSpan) -> str:
 
 def picture_words(run: RunData, key: KeyFrame) -> str:
     """A description of a key frame for screen readers."""
-    seen = [f"{called(run, k.object_id)}" for k in key.looks if k.object_id is not None]
-    objects = f"in view: {'; '.join(seen)}" if seen else "no object in view"
+    names = [f"{called(run, k.object_id)}" for k in key.closeups if k.object_id is not None]
+    objects = f"in view: {'; '.join(names)}" if names else "no object in view"
     return (
         f"Frame {key.frame_index} at {key.time:.1f} s, {objects}. {' '.join(key.captions)}".strip()
     )
@@ -98,24 +103,26 @@ def count(n: int, what: str) -> str:
     return f"{number} {what}" if n == 1 else f"{number} {what}s"
 
 
-def _watched(run: RunData) -> str:
+def _source_sentence(run: RunData) -> str:
     if not run.frames:
         return "visup saw no frame of this source."
     width, height = run.frame_size
     what = f"visup watched {run.duration:.1f} s of video ({run.frames} frames, {width}×{height})"
     if not run.tasks:
-        return f"{what} without a task.{_began(run)}"
+        return f"{what} without a task.{_start_sentence(run)}"
     names = ", ".join(f"“{t.task}”" for t in run.tasks)
-    return f"{what} against the task{'s' if len(run.tasks) > 1 else ''} {names}.{_began(run)}"
+    return (
+        f"{what} against the task{'s' if len(run.tasks) > 1 else ''} {names}.{_start_sentence(run)}"
+    )
 
 
-def _began(run: RunData) -> str:
+def _start_sentence(run: RunData) -> str:
     """When it began in wall-clock time, if known."""
     at = run.clock.text(0.0)
     return f" It began on {at[:10]} at {at[11:19]} UTC." if at else ""
 
 
-def _followed(run: RunData) -> str:
+def _objects_sentence(run: RunData) -> str:
     if not run.frames:
         return ""
     if not run.objects:
@@ -124,26 +131,26 @@ def _followed(run: RunData) -> str:
     text = f"It followed {count(len(run.objects), 'object')}"
     if not named:
         return f"{text}."
-    best = sorted(named, key=lambda s: (-s.share, s.id))[:MOST_NAMED]
+    best = sorted(named, key=lambda s: (-s.share, s.id))[:MAX_NAMED]
     names = [f"{spoken(s.name)} ({s.share:.0%})".replace("%", " %") for s in best]
     return f"{text}, believed to be {_listed(names)}."
 
 
-def _why(run: RunData) -> list[str]:
+def _reasons(run: RunData) -> list[str]:
     return [_sentence(t.evidence) for t in run.tasks if t.evidence]
 
 
-def _alerted(alerts: tuple[Alert, ...], told: Sequence[str]) -> str:
-    """How many alerts there were, and the first one, unless its reason has been `told`."""
-    grave = [a for a in alerts if a.severity > Severity.INFO]
-    if not grave:
+def _alert_sentence(alerts: tuple[Alert, ...], reasons: Sequence[str]) -> str:
+    """How many alerts there were, and the first one, unless its reason has been `reasons`."""
+    warnings = [a for a in alerts if a.severity > Severity.INFO]
+    if not warnings:
         return "No alert was raised."
-    first = min(grave, key=lambda a: (a.opened, a.id))
-    verb = "was" if len(grave) == 1 else "were"
-    begins = "" if len(grave) == 1 else "the first "
-    text = f"{count(len(grave), 'alert')} {verb} raised, {begins}at {first.opened:.1f} s"
-    known = any(why.rstrip(".").casefold() in first.cause.casefold() for why in told)
-    return _sentence(text if known else f"{text}: {first.cause}")
+    first = min(warnings, key=lambda a: (a.opened, a.id))
+    verb = "was" if len(warnings) == 1 else "were"
+    begins = "" if len(warnings) == 1 else "the first "
+    text = f"{count(len(warnings), 'alert')} {verb} raised, {begins}at {first.opened:.1f} s"
+    reported = any(reason.rstrip(".").casefold() in first.cause.casefold() for reason in reasons)
+    return _sentence(text if reported else f"{text}: {first.cause}")
 
 
 def _sentence(text: str) -> str:

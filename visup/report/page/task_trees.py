@@ -16,12 +16,12 @@ from visup.tasks.tools.outline import Branch
 PENDING = Status.PENDING.value
 
 
-def courses(run: RunData) -> str:
+def task_trees(run: RunData) -> str:
     """The trees of all tasks of a run; empty without a task."""
-    return "".join(_course(run, tree) for tree in run.courses)
+    return "".join(_task_tree(run, tree) for tree in run.task_trees)
 
 
-def changes(run: RunData, task: str, stage: str) -> list[tuple[float, str]]:
+def stage_changes(run: RunData, task: str, stage: str) -> list[tuple[float, str]]:
     """(seconds, status) changes of a stage in order; empty for one that is never evaluated."""
     spans = (s for s in run.spans_about("stage") if s.subject == ("stage", task, stage))
     return [(round(s.start, 3), s.value) for s in sorted(spans, key=_start)]
@@ -31,7 +31,7 @@ def _start(span: StateSpan) -> float:
     return span.start
 
 
-def _course(run: RunData, tree: Branch) -> str:
+def _task_tree(run: RunData, tree: Branch) -> str:
     name = escape(tree.text)
     slider = (
         f'<p class=moment hidden><button type=button class=play aria-label="Play">▶</button>'
@@ -52,12 +52,12 @@ def _inside(run: RunData, task: str, branch: Branch) -> str:
 
 
 def _branch(run: RunData, task: str, branch: Branch) -> str:
-    told = changes(run, task, branch.stage) if branch.kind == "stage" else []
+    status_changes = stage_changes(run, task, branch.stage) if branch.kind == "stage" else []
     again = " <span class=quiet>(see above)</span>" if branch.again else ""
     text = escape(branch.text)
-    if told:
-        status = escape(told[-1][1])
-        data = escape(json.dumps(told, separators=(",", ":")), quote=True)
+    if status_changes:
+        status = escape(status_changes[-1][1])
+        data = escape(json.dumps(status_changes, separators=(",", ":")), quote=True)
         head = (
             f'<span class="step {status}" data-changes="{data}"><b>{text}</b> '
             f"<i>{status}</i></span>"

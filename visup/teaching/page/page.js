@@ -21,9 +21,9 @@ async function ask(what, given) {
   const answer = await fetch(what, given === undefined ? {} : {
     method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(given),
   });
-  const told = await answer.json().catch(() => ({ error: `the server said ${answer.status}` }));
-  if (told.error) throw new Error(told.error);
-  return told;
+  const reply = await answer.json().catch(() => ({ error: `the server said ${answer.status}` }));
+  if (reply.error) throw new Error(reply.error);
+  return reply;
 }
 
 function tell(text, kind = "") {
@@ -230,8 +230,8 @@ function list() {
     const size = [xs, ys].map((n) => Math.round(Math.max(...n) - Math.min(...n))).join(" × ");
     const field = item.querySelector("input");
     if (document.activeElement !== field || field.value.trim() !== thing.name) field.value = thing.name;
-    const told = `frame ${thing.frame}, ${size}${thing.stored ? ", stored" : ""}`;
-    item.querySelector("span").textContent = told;
+    const details = `frame ${thing.frame}, ${size}${thing.stored ? ", stored" : ""}`;
+    item.querySelector("span").textContent = details;
     item.style.borderLeftColor = COLOURS[k % COLOURS.length];
     item.className = thing === state.chosen ? "chosen" : "";
   });
@@ -289,10 +289,10 @@ async function save() {
   tell("Storing ...");
   try {
     const sent = fresh.map(({ name, frame, corners: c }) => ({ name, frame, corners: c }));
-    const { told } = await ask("save", { things: sent });
+    const { messages } = await ask("save", { things: sent });
     fresh.forEach((t) => { t.stored = true; });
     remember(fresh.map((t) => t.name));
-    tell(`Stored.\n${told.join("\n")}`, "good");
+    tell(`Stored.\n${messages.join("\n")}`, "good");
   } catch (fault) {
     tell(fault.message, "bad");
   }
