@@ -20,7 +20,7 @@ SIZES = [(640, 480), (320, 240), (1280, 720), (64, 48), (200, 400), (17, 9)]
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_annotation_is_pure_and_repeats(size: tuple[int, int]) -> None:
+def test_annotation_is_pure_and_deterministic(size: tuple[int, int]) -> None:
     frame, mind = frame_at(45, size), mind_at(45, size)
     before = frame.image.copy()
     once, again = annotate(frame.image, mind), annotate(frame.image, mind)
@@ -50,7 +50,7 @@ def test_an_object_is_outlined_in_its_own_colour() -> None:
         assert np.abs(near - wanted).sum(axis=1).min() < 60
 
 
-def test_what_has_left_or_is_unconfirmed_is_not_drawn() -> None:
+def test_objects_that_left_or_are_unconfirmed_are_not_drawn() -> None:
     image = np.zeros((480, 640, 3), np.uint8)
     mind = replace(mind_at(10), tasks=(), alerts=())
     gone = {i: replace(b, presence=Presence.LEFT) for i, b in mind.objects.items()}
@@ -76,7 +76,7 @@ def test_a_hidden_object_is_dashed_not_solid() -> None:
 
 
 @pytest.mark.parametrize("severity", [Severity.WARNING, Severity.CRITICAL])
-def test_an_open_alert_stands_at_the_top_until_it_closes(severity: Severity) -> None:
+def test_an_open_alert_is_at_the_top_until_it_closes(severity: Severity) -> None:
     image = np.zeros((480, 640, 3), np.uint8)
     alert = Alert(1, "collision_course", severity, 1.0, 2.0, (), "Two objects may collide.")
     shown = annotate(image, Mind(alerts=(alert,)))[:20]
@@ -112,7 +112,7 @@ def test_labels_stay_inside_and_apart(boxes: list[tuple[int, int, int, int]]) ->
         placed.append(tag)
 
 
-def test_labels_tell_name_and_share() -> None:
+def test_labels_have_name_and_share() -> None:
     belief = mind_at(20).objects[1]
     mind = Mind()
     assert label_of(belief, mind) == f"1 spartan {belief.strength * 100:.0f} %"

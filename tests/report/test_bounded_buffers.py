@@ -13,7 +13,7 @@ from visup.report.records import StateSpan
 
 @given(max_items=st.integers(2, 40), count=st.integers(0, 500))
 @settings(max_examples=100, deadline=None)
-def test_a_thinned_stream_is_even_starts_at_its_start_and_never_overflows(
+def test_samples_of_a_stream_are_even_from_its_start_and_limited(
     most: int, count: int
 ) -> None:
     kept = EvenSample[int](most)
@@ -40,7 +40,7 @@ def test_a_thinned_stream_is_even_starts_at_its_start_and_never_overflows(
     max_items=st.integers(1, 10),
 )
 @settings(max_examples=100, deadline=None)
-def test_the_heaviest_stay_and_among_equals_the_earlier(weights: list[int], most: int) -> None:
+def test_the_heaviest_items_are_kept_and_among_equals_the_earlier(weights: list[int], most: int) -> None:
     kept = TopWeighted[tuple[int, int]](most, lambda x: x[1])
     for item in enumerate(weights):
         if kept.would_keep(item[1]):
@@ -56,7 +56,7 @@ STATES = st.lists(
 
 @given(states=STATES)
 @settings(max_examples=100, deadline=None)
-def test_spans_say_at_each_moment_what_was_told(states: list[dict[str, str]]) -> None:
+def test_spans_have_the_reported_value_at_each_time(states: list[dict[str, str]]) -> None:
     recorder = SpanRecorder(max_items=1000)
     for t, state in enumerate(states):
         recorder.record(float(t), {(k,): v for k, v in state.items()})
@@ -80,6 +80,6 @@ def test_spans_that_do_not_fit_are_dropped() -> None:
     )
 
 
-def test_nothing_told_leaves_no_span() -> None:
+def test_without_values_there_are_no_spans() -> None:
     assert SpanRecorder(max_items=2).spans(1.0) == ()
     assert EvenSample[int](2).items() == ()

@@ -24,7 +24,7 @@ def collected(limits: ReportLimits | None = None) -> Collector:
     return collector
 
 
-def test_a_run_is_kept_whole_where_it_fits() -> None:
+def test_a_short_run_is_kept_completely() -> None:
     data = collected().finish(Verdict.FAILED, {"source": "clip.mp4"})
     assert (data.source, data.verdict, data.frames) == ("clip.mp4", Verdict.FAILED, END_S * FPS + 1)
     assert data.duration == END_S
@@ -55,13 +55,13 @@ def test_key_frames_are_those_of_events_and_the_two_ends() -> None:
         assert similarities == sorted(similarities, reverse=True)
 
 
-def test_looks_name_the_time_at_which_the_matcher_looked() -> None:
+def test_closeups_have_the_time_of_their_match() -> None:
     data = collected().finish()
     odd = next(k for k in data.key_frames if k.frame_index == 15)
     assert odd.closeups[0].matched_at == pytest.approx(14 / FPS)
 
 
-def test_spans_follow_stages_moves_and_presence() -> None:
+def test_spans_follow_stages_trends_and_presence() -> None:
     data = collected().finish()
     moves = data.spans_about("relation")
     assert [s.value for s in moves] == ["converging", "diverging"]
@@ -96,7 +96,7 @@ def test_memory_is_bounded_whatever_the_length() -> None:
     assert len(long.finish().key_frames) <= 4
 
 
-def test_the_picture_of_a_grave_event_survives_many_light_ones() -> None:
+def test_the_picture_of_a_severe_event_outlasts_many_lighter_ones() -> None:
     collector = Collector(ReportLimits(key_frames=3))
     for step, frame in run((64, 48)):
         entry = Event("entry", step.time, step.frame_index, "An object is in view.")
@@ -104,7 +104,7 @@ def test_the_picture_of_a_grave_event_survives_many_light_ones() -> None:
     assert 36 in [k.frame_index for k in collector.finish().key_frames]
 
 
-def test_an_empty_run_is_a_run() -> None:
+def test_an_empty_run_has_data() -> None:
     data = Collector().finish()
     assert (data.frames, data.key_frames, data.samples, data.spans) == (0, (), (), ())
 
@@ -124,12 +124,12 @@ def test_distance_is_the_gap_between_outlines_unless_rules_tell_it() -> None:
     assert (known.gap, known.sigma) == (7.5, 0.5)
 
 
-def test_of_the_hidden_no_distance_is_known() -> None:
+def test_hidden_objects_have_no_distance() -> None:
     assert (1, 2) not in sample_of(mind_at(16)).distances
     assert (1, 2) in sample_of(mind_at(20)).distances
 
 
-def test_what_matters_weighs_more() -> None:
+def test_important_events_weigh_more() -> None:
     def weight(kind: str, severity: Severity = Severity.INFO) -> int:
         return weight_of((Event(kind, 0.0, 0, "x", severity=severity),))
 
@@ -139,7 +139,7 @@ def test_what_matters_weighs_more() -> None:
 
 
 @pytest.mark.parametrize("index", [0, 30, 60])
-def test_cut_outs_fit_and_show_the_object(index: int) -> None:
+def test_crops_fit_and_show_the_object(index: int) -> None:
     mind = mind_at(index)
     image = np.full((480, 640, 3), 200, np.uint8)
     for belief in mind.objects.values():

@@ -62,14 +62,14 @@ def unsixel(codes: str) -> NDArray[np.int64]:
 
 
 @given(PICTURES)
-def test_sixels_are_read_as_the_picture_in_fewer_colours(picture: NDArray[np.uint8]) -> None:
+def test_sixels_decode_to_the_picture_in_fewer_colours(picture: NDArray[np.uint8]) -> None:
     quantized = Image.fromarray(np.ascontiguousarray(picture[:, :, ::-1])).quantize(COLOURS)
     expected = (np.asarray(quantized.convert("RGB"), int) * 100 + 127) // 255
     assert np.array_equal(unsixel(sixel_codes(picture)), expected)
 
 
 @given(PICTURES)
-def test_kitty_gets_the_picture_in_pieces(picture: NDArray[np.uint8]) -> None:
+def test_kitty_pictures_are_sent_in_chunks(picture: NDArray[np.uint8]) -> None:
     big = np.tile(picture, (6, 9, 1))
     pieces = re.findall(r"\x1b_G([^;]*);([^\x1b]*)\x1b\\", kitty_codes(big))
     assert [head.endswith("m=1") for head, _ in pieces] == [True] * (len(pieces) - 1) + [False]
@@ -97,7 +97,7 @@ def test_kitty_gets_the_picture_in_pieces(picture: NDArray[np.uint8]) -> None:
         ({"TERM": "xterm", "VISUP_GRAPHICS": "nonsense"}, Graphics.TEXT),
     ],
 )
-def test_a_terminal_is_known_by_what_it_sets(
+def test_the_graphics_protocol_follows_the_environment(
     environment: dict[str, str], graphics: Graphics
 ) -> None:
     assert graphics_of(environment) is graphics
@@ -114,7 +114,7 @@ def test_a_pipe_gets_no_codes(graphics: Graphics) -> None:
         assert ("\x1bPq" in out.getvalue()) is (terminal and graphics is Graphics.SIXEL)
 
 
-def test_what_an_answer_rests_on_is_lit_and_the_rest_dimmed() -> None:
+def test_regions_of_an_explanation_are_highlighted() -> None:
     frame = np.full((60, 80, 3), 200, np.uint8)
     region = region_of(np.ones((20, 20), bool), 3, at=(40, 30), size=(80, 60))
     made = spotlight(frame, [region, region])

@@ -50,7 +50,7 @@ def test_without_a_frame_there_is_no_file(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_unwritable_place_is_told(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_an_unwritable_path_is_reported(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     writer = WebmWriter(tmp_path / "missing" / "a.webm", 25.0)
     with pytest.raises(OutputError, match="cannot be written"):
         writer.write(np.zeros((48, 64, 3), np.uint8))

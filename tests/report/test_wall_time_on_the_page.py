@@ -21,7 +21,7 @@ RUN = RunData(
 CAMERA = replace(RUN, clock=WallClock(((0.0, 1795455235.0),)))
 
 
-def test_a_camera_tells_the_time_of_the_wall() -> None:
+def test_times_of_a_camera_include_wall_clock_time() -> None:
     assert "It began on 2026-11-23 at 17:33:55 UTC." in summary(CAMERA)
     for part in (sections.narrative(CAMERA), sections.alerts(CAMERA)):
         assert 'datetime="2026-11-23T17:34:56.000Z"' in part
@@ -29,7 +29,7 @@ def test_a_camera_tells_the_time_of_the_wall() -> None:
         assert "61.0 s" in part
 
 
-def test_a_file_has_seconds_alone() -> None:
+def test_times_of_a_file_are_seconds_only() -> None:
     assert "It began" not in summary(RUN)
     assert "<time>61.0 s</time>" in sections.narrative(RUN)
     assert "<time>from 61.0 s</time>" in sections.alerts(RUN)

@@ -52,7 +52,7 @@ def told_of(folder: Path, said: dict[int, list[str]], box_from: int = 0) -> list
         st.integers(3, 20), st.lists(st.sampled_from(["arm", "spartan"]), max_size=3), max_size=4
     )
 )
-def test_the_last_word_holds_and_nothing_is_told_twice(
+def test_the_last_answer_counts_and_is_passed_on_once(
     tmp_path_factory: pytest.TempPathFactory, said: dict[int, list[str]]
 ) -> None:
     told = told_of(tmp_path_factory.mktemp("run"), said)
@@ -63,14 +63,14 @@ def test_the_last_word_holds_and_nothing_is_told_twice(
     assert told == expected
 
 
-def test_what_was_said_before_a_run_goes_on_is_taken_up_and_what_is_known_is_not(
+def test_on_resume_new_answers_are_passed_on_and_known_ones_are_not(
     tmp_path: Path,
 ) -> None:
     assert told_of(tmp_path, {2: ["arm", "spartan"]}, box_from=10) == [(11, "spartan")]
 
 
 @pytest.mark.parametrize("line", ["1=nobody", "what?", "\x00\xff", "=arm", "1="])
-def test_a_line_that_is_no_answer_is_told_once(tmp_path: Path, line: str) -> None:
+def test_an_invalid_answer_is_reported_once(tmp_path: Path, line: str) -> None:
     agent = reasoning_agent(SETTINGS)
     troubles: list[str] = []
     box = AnswerBox(agent, lambda: tmp_path, troubles.append)
@@ -86,7 +86,7 @@ def test_a_line_that_is_no_answer_is_told_once(tmp_path: Path, line: str) -> Non
     assert agent.mind.answers == {1: "arm"}
 
 
-def test_what_is_no_file_does_not_stop_a_run(tmp_path: Path) -> None:
+def test_an_answer_file_that_is_no_file_does_not_stop_a_run(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / ANSWERS)
     agent = reasoning_agent(SETTINGS)
     box = AnswerBox(agent, lambda: tmp_path, None)
@@ -96,7 +96,7 @@ def test_what_is_no_file_does_not_stop_a_run(tmp_path: Path) -> None:
     box(agent.reason(SEEN[3]), FRAME)
 
 
-def test_an_answer_is_one_line_and_there_are_not_endlessly_many(tmp_path: Path) -> None:
+def test_answers_are_single_lines_of_limited_number(tmp_path: Path) -> None:
     put_answer(tmp_path, 2, "the\n1=arm   big one")
     assert (tmp_path / ANSWERS).read_text() == "2=the 1=arm big one\n"
     with pytest.raises(SettingsError):
@@ -108,7 +108,7 @@ def test_an_answer_is_one_line_and_there_are_not_endlessly_many(tmp_path: Path) 
         put_answer(tmp_path, 2, "arm")
 
 
-def test_a_run_takes_up_what_is_put_into_its_folder(tmp_path: Path) -> None:
+def test_a_run_reads_answers_put_into_its_folder(tmp_path: Path) -> None:
     clip = write_clip(tmp_path / "disc.avi", moving_disc(30), fps=20.0)
     folder = tmp_path / "run"
 

@@ -35,7 +35,7 @@ READERS: dict[str, Callable[[Path], object]] = {
 
 @pytest.mark.parametrize("read", READERS.values(), ids=READERS)
 @pytest.mark.parametrize("kind", ["pipe", "device", "folder"])
-def test_what_is_no_file_is_not_waited_for(
+def test_special_files_are_not_waited_for(
     read: Callable[[Path], object], kind: str, tmp_path: Path
 ) -> None:
     path = tmp_path / "given"
@@ -59,7 +59,7 @@ def test_what_is_no_file_is_not_waited_for(
     ],
     ids=["lists", "lines", "cells", "empty lines"],
 )
-def test_tables_of_too_many_values_take_no_memory(
+def test_oversized_tables_take_no_memory(
     read: Callable[[Path], object], text: str, tmp_path: Path
 ) -> None:
     (tmp_path / "table").write_text(text)
@@ -79,20 +79,20 @@ def test_tables_of_too_many_values_take_no_memory(
         '{"annotations":' + "[" * 100_000,
     ],
 )
-def test_boxes_without_end_are_refused(line: str, tmp_path: Path) -> None:
+def test_endless_boxes_are_refused(line: str, tmp_path: Path) -> None:
     (tmp_path / "boxes").write_text(line)
     with pytest.raises(VisupError, match="cannot be used"):
         read_detections(tmp_path / "boxes")
 
 
-def test_of_a_line_of_boxes_only_what_is_used_is_looked_at(tmp_path: Path) -> None:
+def test_only_the_used_columns_of_a_box_are_parsed(tmp_path: Path) -> None:
     (tmp_path / "boxes").write_text("1,7,0,0,9,9,0.5" + ",-1" * 100_000)
     ((box,),) = read_detections(tmp_path / "boxes").values()
     assert (box.track, box.score) == (7, 0.5)
 
 
 @pytest.mark.parametrize("kind", ["pipe", "device"])
-def test_a_rate_that_is_no_file_is_none(kind: str, tmp_path: Path) -> None:
+def test_an_unreadable_rate_is_none(kind: str, tmp_path: Path) -> None:
     for n, image in enumerate(moving_disc(2)):
         cv2.imwrite(str(tmp_path / f"{n}.png"), image)
     info = tmp_path / "seqinfo.ini"
@@ -105,13 +105,13 @@ def test_a_rate_that_is_no_file_is_none(kind: str, tmp_path: Path) -> None:
         assert len(list(video)) == 2
 
 
-def test_marks_are_counted() -> None:
+def test_bookmarks_are_limited() -> None:
     check_room(b"[1,2]", 2)
     with pytest.raises(ValueError, match="more than 1 values"):
         check_room(b"[1,2]", 1)
 
 
-def test_an_editor_that_announces_too_much_is_told() -> None:
+def test_an_oversized_editor_message_is_refused() -> None:
     pytest.importorskip("pygls", reason="the extra visup[lsp] is not installed")
     from visup.commands.task.language_server import serve
 
@@ -119,7 +119,7 @@ def test_an_editor_that_announces_too_much_is_told() -> None:
         serve(io.BytesIO(b"Content-Length: 1000000000000\r\n\r\n{"), io.BytesIO())
 
 
-def test_nothing_is_written_through_a_link_that_leads_nowhere(tmp_path: Path) -> None:
+def test_dangling_links_are_not_written_through(tmp_path: Path) -> None:
     """A stranger's run folder that is resumed must not make files elsewhere."""
     (tmp_path / "annotated.webm").symlink_to(tmp_path / "elsewhere")
     (tmp_path / "annotated-2.webm").touch()

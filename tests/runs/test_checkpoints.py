@@ -20,7 +20,7 @@ from visup.version import __version__
 
 
 @pytest.mark.parametrize("size", [100, 400, 3000])
-def test_states_write_no_more_than_they_may_in_an_hour(
+def test_checkpoints_keep_to_their_write_budget(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, size: int
 ) -> None:
     monkeypatch.setattr(checkpoints, "BYTES_PER_HOUR", 16_000.0)
@@ -47,7 +47,7 @@ def test_states_write_no_more_than_they_may_in_an_hour(
         (ThreadPoolExecutor, "submit", RuntimeError("can't start new thread")),
     ],
 )
-def test_a_state_that_there_is_no_memory_for_ends_nothing(
+def test_lack_of_memory_for_a_checkpoint_stops_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, holder: type, name: str, fault: Exception
 ) -> None:
     faults = [fault]
@@ -78,7 +78,7 @@ SOUND = COMPRESSED + zlib.compress(
 
 
 @pytest.mark.parametrize("change", [lambda data: data[40:], lambda data: data[:-1] + b"x", None])
-def test_a_state_of_somebody_else_is_not_read(
+def test_a_checkpoint_of_another_user_is_not_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, change: Any
 ) -> None:
     """Its numbers would go to compiled loops unchecked."""
@@ -96,7 +96,7 @@ def test_a_state_of_somebody_else_is_not_read(
     assert (found, "another user" in str(why)) == (None, True)
 
 
-def test_whoever_begins_at_once_has_one_key(
+def test_concurrent_processes_share_one_key(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(KEY_FILE, str(tmp_path / "deep" / "key"))
@@ -107,7 +107,7 @@ def test_whoever_begins_at_once_has_one_key(
     assert [p.name for p in (tmp_path / "deep").iterdir()] == ["key"]
 
 
-def test_where_no_key_can_be_kept_no_state_is_and_it_is_told(
+def test_without_a_key_no_checkpoint_is_saved_and_this_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "file").touch()
@@ -120,7 +120,7 @@ def test_where_no_key_can_be_kept_no_state_is_and_it_is_told(
     assert not (tmp_path / CHECKPOINT).exists()
 
 
-def test_a_state_is_compressed_and_reads_back(tmp_path: Path) -> None:
+def test_a_checkpoint_is_compressed_and_read_back(tmp_path: Path) -> None:
     state = {"visup": __version__, "frame_index": 7, "agent": {}, "kept": {"a": [1, 2]}}
     data = dump_state(state)
     write_state(tmp_path, COMPRESSED + zlib.compress(data))
@@ -130,7 +130,7 @@ def test_a_state_is_compressed_and_reads_back(tmp_path: Path) -> None:
     assert (found.frame_index, found.recorder) == (7, {"a": [1, 2]})
 
 
-def test_a_state_of_another_version_is_none_and_says_which(tmp_path: Path) -> None:
+def test_a_checkpoint_of_another_version_is_refused_with_its_version(tmp_path: Path) -> None:
     state = {"visup": "0.0.9", "frame_index": 7, "agent": {}, "kept": {}}
     write_state(tmp_path, COMPRESSED + zlib.compress(dump_state(state)))
     assert read_checkpoint(tmp_path) == (None, "its checkpoint is of visup 0.0.9")
@@ -145,7 +145,7 @@ def _flipped(data: bytes) -> bytes:
 
 
 @pytest.mark.parametrize("damage", [_cut, _flipped, lambda data: COMPRESSED, lambda data: data[:3]])
-def test_a_damaged_state_is_none_and_says_why(tmp_path: Path, damage: Any) -> None:
+def test_a_damaged_checkpoint_is_refused_with_the_reason(tmp_path: Path, damage: Any) -> None:
     data = dump_state({"visup": __version__, "frame_index": 7, "agent": {}, "kept": {}})
     write_state(tmp_path, damage(COMPRESSED + zlib.compress(data)))
     found, why = read_checkpoint(tmp_path)
@@ -153,7 +153,7 @@ def test_a_damaged_state_is_none_and_says_why(tmp_path: Path, damage: Any) -> No
     assert why
 
 
-def test_a_state_that_would_fill_the_memory_is_none(
+def test_an_oversized_checkpoint_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(checkpoints, "MAX_STATE_BYTES", 10**6)

@@ -19,7 +19,7 @@ FOUND, MISSING = Binding("arm", (), 1, 1.0), Binding("tray", ())
         (Verdict.SUCCEEDED, (MISSING,), []),
     ],
 )
-def test_of_a_task_that_could_not_be_followed_the_actors_that_were_not_found_are_named(
+def test_missing_actors_of_a_task_are_named_at_the_end(
     verdict: Verdict, bindings: tuple[Binding, ...], named: list[str]
 ) -> None:
     mind = Mind(tasks=(TaskBelief("serve", verdict, bindings=bindings),))

@@ -57,7 +57,7 @@ def told(folder: Path, cores: list[int]) -> tuple[bytes, list[bytes], list[objec
 
 
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="cores cannot be chosen here")
-def test_what_is_seen_and_told_is_the_same_byte_for_byte_on_one_core_and_on_all(
+def test_journal_and_events_are_identical_on_one_core_and_on_all(
     tmp_path: Path,
 ) -> None:
     cores = sorted(os.sched_getaffinity(0))

@@ -25,7 +25,7 @@ TIMES = st.lists(st.floats(0.0, 50.0), max_size=40).map(sorted)
 
 
 @given(TIMES, st.lists(st.integers(0, 50), min_size=40, max_size=40), st.floats(0.0, 20.0))
-def test_a_ring_holds_the_last_frames_within_its_bounds(
+def test_a_ring_holds_the_last_frames_within_its_limits(
     times: list[float], sizes: list[int], span: float
 ) -> None:
     ring, added = FrameRing(span, 100), []
@@ -41,7 +41,7 @@ def test_a_ring_holds_the_last_frames_within_its_bounds(
 
 
 @given(st.lists(st.booleans(), min_size=1, max_size=40), st.integers(0, 2**16))
-def test_what_is_kept_shows_all_that_can_be_seen_and_is_never_older_than_a_second(
+def test_reused_frames_show_every_visible_change_and_are_under_a_second_old(
     moves: list[bool], seed: int
 ) -> None:
     """Noise of a camera is nothing to be seen; a change of ten levels on one cell is."""
@@ -62,7 +62,7 @@ def test_what_is_kept_shows_all_that_can_be_seen_and_is_never_older_than_a_secon
 
 
 @given(TIMES, st.floats(1.0, 30.0))
-def test_a_clip_lasts_as_long_as_what_it_shows(times: list[float], fps: float) -> None:
+def test_a_clip_is_as_long_as_its_frames(times: list[float], fps: float) -> None:
     frames = [EncodedFrame(t, b"") for t in times]
     shown = list(at_constant_rate(frames, fps))
     assert [f.time for f in shown] == sorted(f.time for f in shown)
@@ -72,7 +72,7 @@ def test_a_clip_lasts_as_long_as_what_it_shows(times: list[float], fps: float) -
 
 
 @given(st.lists(st.binary(max_size=20), max_size=6), st.integers(0, 300))
-def test_a_spool_that_is_cut_off_gives_what_was_written_whole(
+def test_a_truncated_spool_yields_its_complete_frames(
     tmp_path_factory: pytest.TempPathFactory, pictures: list[bytes], cut: int
 ) -> None:
     path = tmp_path_factory.mktemp("spool") / f"a{SUFFIX}"
@@ -121,7 +121,7 @@ def frames_in(clip: Path) -> int:
     return count
 
 
-def test_an_alert_has_a_picture_at_once_and_a_clip_round_it(run: Path) -> None:
+def test_an_alert_has_a_picture_at_once_and_later_a_clip(run: Path) -> None:
     keeper = EvidenceKeeper(run, OPTIONS, 10.0)
     first = alert(1, 3.0)
     watch(keeper, iter(FRAMES[:31]), at_30=first)
@@ -139,7 +139,7 @@ def test_an_alert_has_a_picture_at_once_and_a_clip_round_it(run: Path) -> None:
     assert [p.suffix for p in (run / EVIDENCE).iterdir() if p.name.startswith(".")] == []
 
 
-def test_alerts_at_one_time_share_a_clip_and_links_are_as_the_user_wants_them(run: Path) -> None:
+def test_concurrent_alerts_share_a_clip_and_links_follow_the_options(run: Path) -> None:
     keeper = EvidenceKeeper(run, EvidenceOptions(1.0, 0.5, link="https://cell/v/yard"), 10.0)
     one, two, three = alert(1, 1.0), alert(2, 1.3), alert(3, 4.0)
     watch(keeper, iter(FRAMES), at_10=one, at_13=two, at_40=three)
@@ -153,7 +153,7 @@ def test_alerts_at_one_time_share_a_clip_and_links_are_as_the_user_wants_them(ru
     ]
 
 
-def test_who_goes_on_after_a_kill_finishes_the_clip_and_knows_the_links(run: Path) -> None:
+def test_a_resumed_process_finishes_the_clip_and_has_its_links(run: Path) -> None:
     killed = EvidenceKeeper(run, OPTIONS, 10.0)
     first = alert(1, 2.0)
     watch(killed, iter(FRAMES[:23]), at_20=first)
@@ -169,7 +169,7 @@ def test_who_goes_on_after_a_kill_finishes_the_clip_and_knows_the_links(run: Pat
     resumed.close()
 
 
-def test_a_full_disk_is_told_and_stops_nothing(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_is_reported_and_stops_nothing(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     keeper = EvidenceKeeper(run, OPTIONS, 10.0)
 
     def no_room(spool: ClipSpool, frame: EncodedFrame) -> None:
@@ -186,7 +186,7 @@ def test_a_full_disk_is_told_and_stops_nothing(run: Path, monkeypatch: pytest.Mo
     assert frames_in(run / EVIDENCE / "alert-2.webm") >= 14
 
 
-def test_sinks_of_a_run_are_told_where_the_evidence_is(tmp_path: Path) -> None:
+def test_records_for_sinks_link_to_the_evidence(tmp_path: Path) -> None:
     clip = write_clip(tmp_path / "disc.avi", moving_disc(30))
     (tmp_path / "own.rules").write_text(
         'rule seen(a): warning\n    when in_view(a) > 0.1 s\n    say "{a} {is} seen."\n'

@@ -37,13 +37,13 @@ WRONG = {
         ((), ExitCode.GOOD),
     ],
 )
-def test_of_several_things_that_went_wrong_the_gravest_is_told(
+def test_the_exit_code_is_that_of_the_most_severe_problem(
     what: tuple[str, ...], code: ExitCode
 ) -> None:
     assert replace(WELL, **{name: WRONG[name] for name in what}).exit_code is code  # type: ignore[arg-type]
 
 
-def test_a_source_that_breaks_in_the_middle_does_not_end_with_0(tmp_path: Path) -> None:
+def test_a_truncated_source_does_not_exit_with_0(tmp_path: Path) -> None:
     clip = write_clip(tmp_path / "clip.avi", moving_disc(30), fps=10.0)
     data = clip.read_bytes()
     clip.write_bytes(data[: len(data) // 2])
@@ -53,7 +53,7 @@ def test_a_source_that_breaks_in_the_middle_does_not_end_with_0(tmp_path: Path) 
 
 
 @pytest.mark.parametrize("fault", [OutputError("no space left"), RuntimeError("no fonts")])
-def test_a_run_without_its_report_does_not_end_with_0(
+def test_a_run_without_its_report_does_not_exit_with_0(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: Exception
 ) -> None:
     clip = write_clip(tmp_path / "clip.avi", moving_disc(4), fps=10.0)
@@ -71,7 +71,7 @@ def test_a_run_without_its_report_does_not_end_with_0(
     assert any(str(fault) in note for note in result.notes)
 
 
-def test_what_could_not_be_recorded_does_not_end_with_0(
+def test_an_unrecorded_run_does_not_exit_with_0(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     clip = write_clip(tmp_path / "clip.avi", moving_disc(4), fps=10.0)

@@ -29,7 +29,7 @@ RULE = 'rule seen(a): warning\n    when in_view(a) > 0.1 s\n    say "{a} {is} se
 
 
 @given(st.lists(st.floats(0.0, 10.0), max_size=50).map(sorted), st.floats(0.5, 5.0))
-def test_the_next_run_begins_when_the_last_is_long_enough(times: list[float], long: float) -> None:
+def test_the_next_run_begins_after_the_maximum_duration(times: list[float], long: float) -> None:
     roll = RollOver(RunOptions(run_s=long))
     begun = times[0] if times else 0.0
     for time in times:
@@ -40,7 +40,7 @@ def test_the_next_run_begins_when_the_last_is_long_enough(times: list[float], lo
             begun = time
 
 
-def test_so_it_does_when_its_journal_is_large_and_it_is_tried_again_later() -> None:
+def test_the_next_run_begins_at_the_maximum_size_and_is_retried_later() -> None:
     roll = RollOver(RunOptions(run_bytes=100))
     assert not roll.due(0.0, 99)
     assert roll.due(1.0, 100)
@@ -93,7 +93,7 @@ def camera(tmp_path_factory: pytest.TempPathFactory) -> Camera:
     return made
 
 
-def test_every_step_is_in_one_run_and_beliefs_go_on(camera: Camera) -> None:
+def test_every_step_is_in_one_run_and_beliefs_continue(camera: Camera) -> None:
     runs = list(camera.runs())
     assert len(runs) >= 3
     frames = [[s["frame_index"] for s in run.summaries()] for run in runs]
@@ -116,7 +116,7 @@ def test_every_step_is_in_one_run_and_beliefs_go_on(camera: Camera) -> None:
     assert ids == sorted(set(ids))
 
 
-def test_a_next_run_that_cannot_be_begun_leaves_no_folder(
+def test_a_next_run_that_cannot_start_leaves_no_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As on a disk that is full for a while: the run goes on, and the next try succeeds."""
@@ -142,14 +142,14 @@ def test_a_next_run_that_cannot_be_begun_leaves_no_folder(
     assert sorted(frames) == sorted(camera.seen)
 
 
-def test_a_run_that_goes_on_elsewhere_is_not_taken_up(camera: Camera) -> None:
+def test_a_run_that_continues_in_another_is_not_resumed(camera: Camera) -> None:
     first = next(camera.runs()).path.parent
     with pytest.raises(OutputError, match="continues in another"):
         interrupted_run(first)
     assert resumable_run(camera.store.folder, "a") != first
 
 
-def test_one_without_a_step_or_a_state_is_told_apart(tmp_path: Path) -> None:
+def test_a_next_run_without_steps_can_be_resumed_from_its_state(tmp_path: Path) -> None:
     camera = Camera(tmp_path)
     camera.options = replace(camera.options, run_s=0.1)
     camera.watch(6)

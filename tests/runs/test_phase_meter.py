@@ -13,7 +13,7 @@ from visup.percepts.health import HealthBehaviour
 from visup.runs.unattended.phase_meter import PhaseMeter
 
 
-def test_a_step_that_is_measured_is_the_same_step() -> None:
+def test_measuring_does_not_change_a_step() -> None:
     ticks = count()
     told: list[Step] = []
     meter = PhaseMeter(lambda: float(next(ticks)))

@@ -27,7 +27,7 @@ NIGHT = QuietHours.read(["22:00-06:00"], "UTC")
         ("08:00-08:00", ["Mon 08:00", "Tue 07:59"], []),
     ],
 )
-def test_a_period_holds_when_it_says(text: str, quiet: list[str], loud: list[str]) -> None:
+def test_a_quiet_period_covers_its_times(text: str, quiet: list[str], loud: list[str]) -> None:
     hours = QuietHours.read([text], "UTC")
     assert [t for t in quiet if not hours.hold(wall(t))] == []
     assert [t for t in loud if hours.hold(wall(t))] == []
@@ -44,12 +44,12 @@ def wall(text: str) -> float:
     "text",
     ["", "22-6", "25:00-06:00", "22:00-24:30", "10:60-11:00", "Mo 10:00-11:00", "22:00-00:00x"],
 )
-def test_what_is_no_period_is_refused(text: str) -> None:
+def test_an_invalid_period_is_refused(text: str) -> None:
     with pytest.raises(SettingsError, match="quiet hours"):
         quiet_period(text)
 
 
-def test_times_are_those_of_the_zone() -> None:
+def test_quiet_hours_follow_the_time_zone() -> None:
     hours = QuietHours.read(["22:00-06:00"], "Europe/Berlin")
     assert hours.hold(wall("Mon 21:30"))
     assert not hours.hold(wall("Mon 05:30"))
@@ -73,7 +73,7 @@ HOUR = 3600.0
 
 
 @given(LIVES, st.none() | st.floats(1, 60))
-def test_nothing_is_lost_that_still_holds_and_nothing_told_twice(
+def test_open_alerts_are_sent_once_after_quiet_hours(
     lives: list[tuple[float, float, Severity]], killed_at: float | None
 ) -> None:
     """Hours of two days, one step each; the process may be killed once between two steps."""
@@ -102,7 +102,7 @@ def test_nothing_is_lost_that_still_holds_and_nothing_told_twice(
         assert by_id.get((a.id, "closed")) == (None if expected is None else end)
 
 
-def test_what_becomes_critical_is_told_at_once() -> None:
+def test_an_alert_that_becomes_critical_is_sent_at_once() -> None:
     base = wall("Mon 23:00")
     gate = QuietGate(NIGHT, lambda time: base + time)
     grave = alert(1, Severity.WARNING, 0.0)

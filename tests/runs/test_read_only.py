@@ -29,7 +29,7 @@ def place() -> Iterator[Path]:
     os.geteuid() != 0 or shutil.which("setpriv") is None,
     reason="only root can become somebody who may write nowhere",
 )
-def test_visup_is_loaded_where_nothing_can_be_written(place: Path) -> None:
+def test_visup_can_be_imported_on_a_read_only_disk(place: Path) -> None:
     home, folder, code = place / "home", place / "folder", place / "code"
     for path in (home, folder):
         path.mkdir()

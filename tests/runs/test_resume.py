@@ -95,7 +95,7 @@ def test_killed_runs_that_are_resumed_equal_an_unbroken_one(
     assert figures["total"]["lost"] == 0
 
 
-def test_a_kill_that_comes_after_the_end_is_judged_like_any_other(
+def test_a_kill_after_the_end_is_evaluated_like_any_other(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(resume, "FRAMES", 32)
@@ -107,7 +107,7 @@ def test_a_kill_that_comes_after_the_end_is_judged_like_any_other(
 
 
 @pytest.mark.parametrize("state", ["kept", "none", "damaged"])
-def test_a_run_goes_on_to_the_same_end(
+def test_a_resumed_run_has_the_same_outcome(
     clip: WatchSettings, unbroken: Path, tmp_path: Path, state: str
 ) -> None:
     parts = tmp_path / "parts"
@@ -129,7 +129,7 @@ def test_a_run_goes_on_to_the_same_end(
 
 
 @pytest.mark.parametrize("part", ["agent", "kept", "behaviours"])
-def test_a_state_of_an_earlier_form_is_told_and_all_is_perceived_again(
+def test_an_incompatible_checkpoint_is_reported_and_all_frames_perceived_again(
     clip: WatchSettings, unbroken: Path, tmp_path: Path, part: str
 ) -> None:
     parts = tmp_path / "parts"
@@ -149,7 +149,7 @@ def test_a_state_of_an_earlier_form_is_told_and_all_is_perceived_again(
     assert f"another form than visup {__version__} has" in note
 
 
-def test_a_report_of_a_resumed_run_tells_the_whole(clip: WatchSettings, tmp_path: Path) -> None:
+def test_the_report_of_a_resumed_run_covers_the_whole_run(clip: WatchSettings, tmp_path: Path) -> None:
     pytest.importorskip("plotly", reason="the extra visup[report] is not installed")
     options = RunOptions(video=False, state_every_s=0.2)
     broken_run(clip, tmp_path / "run", 30, options)
@@ -160,7 +160,7 @@ def test_a_report_of_a_resumed_run_tells_the_whole(clip: WatchSettings, tmp_path
     assert result.steps == 40
 
 
-def test_a_run_goes_on_only_with_its_own_video(clip: WatchSettings, tmp_path: Path) -> None:
+def test_a_run_is_resumed_only_with_its_own_video(clip: WatchSettings, tmp_path: Path) -> None:
     broken_run(clip, tmp_path / "run", 20, RunOptions(video=False, report=False, state_every_s=0))
     past = interrupted_run(tmp_path / "run")
     other = write_clip(tmp_path / "short.avi", moving_disc(9))
@@ -176,7 +176,7 @@ def test_an_answer_is_replayed(answered: tuple[WatchSettings, Path]) -> None:
 
 
 @pytest.mark.parametrize("at", [12, 14, 15, 16, 17, 25])
-def test_what_the_operator_said_is_remembered(
+def test_answers_of_the_operator_are_remembered_on_resume(
     answered: tuple[WatchSettings, Path], tmp_path: Path, at: int
 ) -> None:
     """An answer is taken up one step after its object is confirmed, whenever the run is killed."""
@@ -205,7 +205,7 @@ def test_a_folder_without_a_run_cannot_be_resumed(tmp_path: Path) -> None:
         interrupted_run(tmp_path)
 
 
-def test_a_replay_tells_the_same_and_another_rule_is_seen(
+def test_a_replay_has_the_same_events_and_applies_other_rules(
     clip: WatchSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     supervise(clip, fresh_folder(tmp_path / "run", ""), options=BARE)
@@ -252,7 +252,7 @@ class Shaky:
         return getattr(self._journal, name)
 
 
-def test_a_disk_that_is_full_for_a_while_is_told_and_nothing_is_lost(
+def test_a_temporarily_full_disk_is_reported_and_nothing_is_lost(
     clip: WatchSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made: list[Shaky] = []
@@ -273,7 +273,7 @@ def test_a_disk_that_is_full_for_a_while_is_told_and_nothing_is_lost(
     assert not transcript_diff(recorded_transcript(run), again)
 
 
-def test_a_disk_that_stays_full_is_neither_what_was_seen_nor_a_good_end(
+def test_a_disk_that_stays_full_changes_the_exit_code_but_not_the_verdict(
     clip: WatchSettings, tmp_path: Path
 ) -> None:
     def fill(step: Step, frame: Frame) -> None:
@@ -292,7 +292,7 @@ def test_a_disk_that_stays_full_is_neither_what_was_seen_nor_a_good_end(
     assert any("no such table" in n for n in result.notes)
 
 
-def test_a_camera_that_drops_comes_back_and_goes_on() -> None:
+def test_a_camera_that_dropped_is_reconnected() -> None:
     images = moving_disc(6)
     later = [FakeCapture([]), FakeCapture(images[3:])]
     said: list[str] = []
@@ -321,7 +321,7 @@ def test_a_camera_that_drops_comes_back_and_goes_on() -> None:
     assert "stopped delivering" in source.problem
 
 
-def test_a_camera_run_goes_on_with_new_numbers_and_later_times(
+def test_a_resumed_camera_run_continues_numbers_and_times(
     clip: WatchSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     images = moving_disc(40)
@@ -365,7 +365,7 @@ def times(*given: float) -> Iterator[Frame]:
         ((5.0, 1e6, 1e6 + 0.1), (5.0, 1e6, 1e6 + 0.1), 0),
     ],
 )
-def test_time_only_goes_on(
+def test_time_is_monotonic(
     given: tuple[float, ...], expected: tuple[float, ...], jumps: int
 ) -> None:
     steady = MonotonicFrames(times(*given), fps=10.0)

@@ -61,7 +61,7 @@ def killed(step: Step, frame: Frame) -> None:
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_system_alerts_are_no_part_of_what_was_seen(tmp_path: Path, case: str) -> None:
+def test_system_alerts_do_not_affect_the_verdict(tmp_path: Path, case: str) -> None:
     if case == "an alert is lost" and not Path("/dev/full").exists():
         pytest.skip("no disk that is always full")
     settings, options = begun(tmp_path, case)
@@ -87,7 +87,7 @@ def test_system_alerts_are_no_part_of_what_was_seen(tmp_path: Path, case: str) -
     assert resumed.verdict is verdict
 
 
-def test_a_run_asked_from_python_comes_to_the_same(tmp_path: Path) -> None:
+def test_a_run_from_python_has_the_same_result(tmp_path: Path) -> None:
     settings, _ = begun(tmp_path, "a behaviour fails")
     with visup.watch(settings.source, behaviours=settings.behaviours) as run:
         next(iter(run))
@@ -103,7 +103,7 @@ def test_a_run_asked_from_python_comes_to_the_same(tmp_path: Path) -> None:
         (Verdict.INTERRUPTED, "something unsafe was seen"),
     ],
 )
-def test_the_last_line_says_which(verdict: Verdict | None, words: str) -> None:
+def test_the_last_line_names_the_run_folder(verdict: Verdict | None, words: str) -> None:
     from rich.text import Text
 
     line = Text.from_markup(verdict_line(verdict, has_task=False)).plain

@@ -71,7 +71,7 @@ def leaks(*texts: bytes, folder: Path) -> list[str]:
     return [f"{where}: {w}" for where, text in told.items() for w in WORDS if w.encode() in text]
 
 
-def test_a_run_keeps_the_password_to_itself(
+def test_the_password_of_a_source_is_not_recorded(
     visup: Call,
     server: http.server.ThreadingHTTPServer,
     tmp_path: Path,
@@ -93,7 +93,7 @@ def test_a_run_keeps_the_password_to_itself(
 
 
 @pytest.mark.parametrize("words", [["watch"], ["check"], ["check", "--task", "dock"]])
-def test_nor_is_it_told_when_a_source_cannot_be_watched(
+def test_errors_of_a_source_do_not_show_its_password(
     visup: Call, server: http.server.ThreadingHTTPServer, tmp_path: Path, words: list[str]
 ) -> None:
     where = address(server)
@@ -105,14 +105,14 @@ def test_nor_is_it_told_when_a_source_cannot_be_watched(
 
 
 @pytest.mark.parametrize("sink", ["webhok:https://a:{}@b/", "webhook:ftp://a:{}@b/"])
-def test_nor_when_a_sink_is_mistyped(visup: Call, tmp_path: Path, sink: str) -> None:
+def test_errors_of_a_sink_do_not_show_its_password(visup: Call, tmp_path: Path, sink: str) -> None:
     clip = write_clip(tmp_path / "clip.avi", moving_disc(2))
     done = visup("watch", clip, "--sink", sink.format(WORDS[0]))
     assert done.code == 2
     assert WORDS[0] not in done.out + done.err
 
 
-def test_who_resumes_such_a_run_names_the_password_again(
+def test_resuming_needs_the_password_again(
     server: http.server.ThreadingHTTPServer, tmp_path: Path
 ) -> None:
     settings = WatchSettings(source=address(server))
@@ -129,7 +129,7 @@ def test_who_resumes_such_a_run_names_the_password_again(
     assert outcome(parts) == outcome(whole)
 
 
-def test_the_command_takes_it_too(
+def test_the_command_accepts_the_source_with_its_password(
     visup: Call, server: http.server.ThreadingHTTPServer, tmp_path: Path
 ) -> None:
     broken_run(WatchSettings(source=address(server)), tmp_path / "run", 12, BARE)
@@ -139,7 +139,7 @@ def test_the_command_takes_it_too(
     assert visup("watch", address(server), "--resume", "run", "--no-video").code == 0
 
 
-def test_of_a_run_without_a_password_no_source_is_taken(visup: Call, tmp_path: Path) -> None:
+def test_resuming_a_run_without_a_password_takes_no_source(visup: Call, tmp_path: Path) -> None:
     clip = write_clip(tmp_path / "clip.avi", moving_disc(20))
     broken_run(WatchSettings(source=str(clip)), tmp_path / "run", 12, BARE)
     assert visup("watch", clip, "--resume", "run").code == 2

@@ -53,7 +53,7 @@ def written(journal: Path, **facts: object) -> None:
 
 
 @pytest.mark.parametrize("named", [{"behaviours": ["{file}"]}, {"plugins": ["shape"]}])
-def test_code_that_a_run_folder_names_does_not_run(
+def test_code_named_in_a_run_folder_is_not_run(
     clip: WatchSettings, tmp_path: Path, named: dict[str, list[str]]
 ) -> None:
     mark, file = tmp_path / "it ran", tmp_path / "lamp.py"
@@ -67,7 +67,7 @@ def test_code_that_a_run_folder_names_does_not_run(
     assert all(name in (refused.value.hint or "") for names in named.values() for name in names)
 
 
-def test_what_is_to_be_typed_again_is_quoted(clip: WatchSettings, tmp_path: Path) -> None:
+def test_hints_with_commands_are_quoted(clip: WatchSettings, tmp_path: Path) -> None:
     broken_run(clip, tmp_path / "run", 5, RunOptions(video=False, report=False, state_every_s=0))
     written(tmp_path / "run" / JOURNAL, behaviours=["a.py; touch owned"], plugins=["$(id)"])
     with pytest.raises(SettingsError) as refused:
@@ -76,7 +76,7 @@ def test_what_is_to_be_typed_again_is_quoted(clip: WatchSettings, tmp_path: Path
     assert words[-4:] == ["--behaviour", "a.py; touch owned", "--plugin", "$(id)"]
 
 
-def test_it_runs_once_it_is_named_again_wherever_it_is_now(
+def test_code_runs_once_it_is_named_again_even_if_it_has_moved(
     clip: WatchSettings, tmp_path: Path
 ) -> None:
     mark, file = tmp_path / "it ran", tmp_path / "lamp.py"
@@ -88,7 +88,7 @@ def test_it_runs_once_it_is_named_again_wherever_it_is_now(
     assert mark.exists()
 
 
-def test_other_code_than_the_run_had_is_refused(clip: WatchSettings, tmp_path: Path) -> None:
+def test_code_that_differs_from_the_run_is_refused(clip: WatchSettings, tmp_path: Path) -> None:
     broken_run(clip, tmp_path / "run", 5, RunOptions(video=False, report=False, state_every_s=0))
     with pytest.raises(SettingsError, match="no custom behaviours"):
         interrupted_run(tmp_path / "run", plugins=("shape",))
@@ -111,7 +111,7 @@ def test_a_live_run_is_not_resumed_and_loses_nothing(clip: WatchSettings, tmp_pa
     assert (run.count(), run.facts()["ended"]) == (12, "complete")
 
 
-def test_a_run_that_somebody_else_went_on_with_is_not_gone_on_with(
+def test_a_run_resumed_by_another_process_is_refused(
     clip: WatchSettings, tmp_path: Path
 ) -> None:
     broken_run(clip, tmp_path / "run", 5, RunOptions(video=False, report=False, state_every_s=0))
@@ -122,7 +122,7 @@ def test_a_run_that_somebody_else_went_on_with_is_not_gone_on_with(
     assert Recording.open(tmp_path / "run").facts()["ended"] == "complete"
 
 
-def test_two_runs_into_one_folder_are_told_apart_in_words(
+def test_a_second_run_into_a_folder_is_refused_with_a_reason(
     clip: WatchSettings, tmp_path: Path
 ) -> None:
     folder = fresh_folder(tmp_path / "run", "")
@@ -138,7 +138,7 @@ def test_two_runs_into_one_folder_are_told_apart_in_words(
         supervise(clip, folder, options=BARE)
 
 
-def test_runs_that_begin_at_once_are_given_folders_of_their_own(
+def test_concurrent_runs_have_their_own_folders(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -171,7 +171,7 @@ def test_a_killed_writer_leaves_no_lock(clip: WatchSettings, tmp_path: Path) -> 
     Journal(folder / JOURNAL, resume=True).close()
 
 
-def test_the_plug_that_is_pulled_releases_the_folder(clip: WatchSettings, tmp_path: Path) -> None:
+def test_a_power_failure_releases_the_folder(clip: WatchSettings, tmp_path: Path) -> None:
     def pull(step: Step, frame: Frame) -> None:
         raise Pulled
 
@@ -183,7 +183,7 @@ def test_the_plug_that_is_pulled_releases_the_folder(clip: WatchSettings, tmp_pa
 
 
 @pytest.mark.parametrize("text", ["a = " + "[" * 5000, "a = " + "1" * 10_400], ids=["deep", "long"])
-def test_toml_beyond_all_bounds_is_refused_in_words(tmp_path: Path, text: str) -> None:
+def test_extreme_toml_is_refused_with_a_message(tmp_path: Path, text: str) -> None:
     from visup.agent.plugins.settings import read_settings
     from visup.runs.inputs.zones import load_zones
 

@@ -48,7 +48,7 @@ def stop_after_an_alert(most_s: float = 20.0) -> Audience:
     return Audience((stop,))
 
 
-def test_a_camera_s_records_say_when_and_where(settings: WatchSettings, tmp_path: Path) -> None:
+def test_records_of_a_camera_have_time_and_place(settings: WatchSettings, tmp_path: Path) -> None:
     live = WatchSettings(source=f"loop:{settings.source}", rules=settings.rules)
     alerts, run = tmp_path / "alerts.jsonl", tmp_path / "run"
     run.mkdir()
@@ -73,7 +73,7 @@ def test_a_camera_s_records_say_when_and_where(settings: WatchSettings, tmp_path
     assert not any("at" in e for e in Recording.open(run).events())
 
 
-def test_a_file_s_records_are_the_same_each_time(settings: WatchSettings, tmp_path: Path) -> None:
+def test_records_of_a_file_are_reproducible(settings: WatchSettings, tmp_path: Path) -> None:
     texts = []
     for name in ("a", "b"):
         (tmp_path / name).mkdir()

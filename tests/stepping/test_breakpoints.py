@@ -123,7 +123,7 @@ def test_a_condition_stops_where_a_scan_says(text: str) -> None:
 
 
 @pytest.mark.parametrize("text", ["alert", "stage approach", "when diverging(1, 3)"])
-def test_until_stops_where_a_breakpoint_does(text: str) -> None:
+def test_until_and_breakpoints_stop_at_the_same_steps(text: str) -> None:
     it, frames = reasoning_stepper(LONG), []
     while not (stopped := it.step(until=text)).ended:
         assert stopped.step is not None
@@ -142,7 +142,7 @@ def test_breakpoints_stop_in_every_run_and_again_after_going_back() -> None:
     assert [b.hits for b in it.breakpoints.values()] == [2, 2]
 
 
-def test_a_breakpoint_that_is_disabled_or_deleted_stops_nobody() -> None:
+def test_disabled_and_deleted_breakpoints_do_not_stop() -> None:
     it = plain_stepper()
     it.break_at("frame 5")
     other = it.break_at(lambda step: step.frame_index == 8)
@@ -171,7 +171,7 @@ def test_a_phase_breakpoint_stops_inside_every_step() -> None:
     assert places == [(0, "update"), (0, "match"), (1, "update"), (1, "match"), (2, "update")]
 
 
-def test_a_watch_shows_what_the_mind_says_and_stops_when_it_changes() -> None:
+def test_a_watch_shows_the_value_in_the_mind_and_stops_at_changes() -> None:
     it = reasoning_stepper(LONG)
     gap, apart = it.watch("gap(1, 2)"), it.watch("diverging(1, 3)", breaks=True)
     changed = []
@@ -209,7 +209,7 @@ BAD = {
 
 
 @pytest.mark.parametrize(("text", "said"), BAD.items())
-def test_what_cannot_be_meant_is_refused_in_words(text: str, said: str) -> None:
+def test_invalid_conditions_are_refused_with_a_message(text: str, said: str) -> None:
     mind = reasoning_course()[-1].mind
     with pytest.raises((SettingsError, RuleError, VisupError)) as fault:
         parse_condition(text, mind)
@@ -217,7 +217,7 @@ def test_what_cannot_be_meant_is_refused_in_words(text: str, said: str) -> None:
 
 
 @pytest.mark.parametrize("text", [*SCANS, "change gap(1, 2)"])
-def test_a_condition_reads_its_own_text_back(text: str) -> None:
+def test_the_text_of_a_condition_can_be_parsed_again(text: str) -> None:
     mind = reasoning_course()[-1].mind
     stop = parse_condition(text, mind)
     assert parse_condition(stop.text, mind).text == stop.text

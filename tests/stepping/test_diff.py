@@ -19,14 +19,14 @@ def between(a: int, b: int) -> MindDiff:
 
 @given(a=STEPS, b=STEPS)
 @settings(max_examples=25, deadline=None)
-def test_a_difference_is_antisymmetric_and_of_a_mind_and_itself_empty(a: int, b: int) -> None:
+def test_differences_are_antisymmetric_and_empty_for_equal_minds(a: int, b: int) -> None:
     assert not between(a, a).changes
     assert between(b, a) == -between(a, b)
 
 
 @given(a=STEPS, b=STEPS, c=STEPS)
 @settings(max_examples=25, deadline=None)
-def test_differences_follow_each_other(a: int, b: int, c: int) -> None:
+def test_consecutive_differences_compose(a: int, b: int, c: int) -> None:
     first, second, both = between(a, b), between(b, c), between(a, c)
 
     def after(diff: MindDiff, what: tuple[str, str]) -> list[str | None]:
@@ -39,7 +39,7 @@ def test_differences_follow_each_other(a: int, b: int, c: int) -> None:
             assert last == [change.after]
 
 
-def test_what_appears_changes_and_goes_is_told() -> None:
+def test_added_changed_and_removed_beliefs_are_listed() -> None:
     diff = between(5, 59)
     text = str(diff)
     assert "~ object object 1: seen, unconfirmed -> seen" in text
@@ -50,7 +50,7 @@ def test_what_appears_changes_and_goes_is_told() -> None:
     assert {c.about for c in diff.about("alert", "stage")} == {"alert", "stage"}
 
 
-def test_of_relations_those_are_told_that_are_true_at_either_end() -> None:
+def test_relations_true_in_either_mind_are_compared() -> None:
     course = reasoning_course()
     a, b = course[20].mind, course[59].mind
     told = {c.what for c in mind_diff(a, b).about("relation")}

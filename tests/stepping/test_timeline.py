@@ -51,7 +51,7 @@ MOVES = st.lists(
 
 @given(moves=MOVES)
 @settings(max_examples=25, deadline=None)
-def test_every_way_to_a_step_leads_to_the_same_step(
+def test_every_path_to_a_step_gives_the_same_step(
     moves: Sequence[tuple[str, int | Phase]],
 ) -> None:
     it, marks = plain_stepper(), list[Bookmark]()
@@ -86,7 +86,7 @@ def walk(it: Stepper, move: str, much: int | Phase, marks: list[Bookmark]) -> No
             assert it.at == mark.number
 
 
-def test_back_and_forth_gives_the_same_bytes_of_all_that_reasons() -> None:
+def test_stepping_back_and_forth_reproduces_all_state() -> None:
     it, course = reasoning_stepper(), reasoning_bytes()
     it.step(COUNT)
     for number in (COUNT - 1, 31, 8, 7, 1):
@@ -95,7 +95,7 @@ def test_back_and_forth_gives_the_same_bytes_of_all_that_reasons() -> None:
         it.go(COUNT)
 
 
-def test_behaviours_do_not_notice_that_somebody_went_back() -> None:
+def test_stepping_back_does_not_affect_behaviours() -> None:
     it = plain_stepper()
     it.step(30)
     it.back(25)
@@ -107,7 +107,7 @@ def test_behaviours_do_not_notice_that_somebody_went_back() -> None:
     assert eye.directives == alone.behaviours[0].directives  # type: ignore[attr-defined]
 
 
-def test_observers_are_told_of_each_step_once() -> None:
+def test_observers_receive_each_step_once() -> None:
     seen: list[int] = []
 
     def observer(step: Step, frame: Frame) -> None:
@@ -125,7 +125,7 @@ def test_observers_are_told_of_each_step_once() -> None:
 
 
 @pytest.mark.parametrize("phase", list(Phase))
-def test_a_half_made_step_can_be_looked_at_finished_and_left(phase: Phase) -> None:
+def test_an_unfinished_step_can_be_inspected_finished_or_left(phase: Phase) -> None:
     it = plain_stepper()
     it.step(3)
     stopped = it.step(until=phase)
@@ -145,7 +145,7 @@ def test_a_half_made_step_can_be_looked_at_finished_and_left(phase: Phase) -> No
     assert it.paused is None
 
 
-def test_a_reasoner_that_raises_is_seen_inside_its_step() -> None:
+def test_a_failing_reasoner_is_visible_inside_its_step() -> None:
     it = Stepper(Agent([], Reasoners(update=(counting, exploding_at(2)))), frames(5))
     it.step(2)
     stopped = it.step(until="update")
@@ -157,7 +157,7 @@ def test_a_reasoner_that_raises_is_seen_inside_its_step() -> None:
     assert [a.kind for a in step.mind.alerts] == ["reasoning_failed"]
 
 
-def test_the_end_is_told_and_the_beginning_can_be_reached() -> None:
+def test_the_end_is_reported_and_the_beginning_can_be_reached() -> None:
     it = plain_stepper(4)
     stopped = it.step(10)
     assert (stopped.taken, stopped.ended, it.at) == (4, True, 4)
@@ -170,7 +170,7 @@ def test_the_end_is_told_and_the_beginning_can_be_reached() -> None:
     assert it.at == 0
 
 
-def test_an_answer_stays_when_going_back_over_it() -> None:
+def test_an_answer_is_kept_when_stepping_back_over_it() -> None:
     it = reasoning_stepper()
     it.step(30)
     it.answer(1, "arm")
@@ -186,14 +186,14 @@ def test_an_answer_stays_when_going_back_over_it() -> None:
     assert told(first) == told(again)
 
 
-def test_a_snapshot_belongs_to_its_course() -> None:
+def test_a_snapshot_belongs_to_its_timeline() -> None:
     it = plain_stepper()
     it.step(5)
     with pytest.raises(SettingsError, match="another timeline"):
         it.branch().restore(it.snapshot())
 
 
-def test_a_time_can_be_gone_to() -> None:
+def test_go_to_time_finds_the_step() -> None:
     it = plain_stepper()
     for seconds, frame in ((2.0, 20), (0.45, 5), (0.0, 0), (3.3, 33)):
         it.go_to_time(seconds)
@@ -203,7 +203,7 @@ def test_a_time_can_be_gone_to() -> None:
     assert it.mind.frame_index == 33
 
 
-def test_what_the_journal_cannot_hold_is_kept_as_it_is() -> None:
+def test_values_the_codec_does_not_support_are_stored_unchanged() -> None:
     it = Stepper(Agent([Scripted("eye", ("x",), Own)]), frames(30), spacing=10, latest=1)
     it.step(25)
     step = it.at_step(7)

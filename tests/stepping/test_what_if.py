@@ -44,7 +44,7 @@ def at(number: int = 30) -> Stepper:
         AssumedPresence(1, Presence.HIDDEN),
     ],
 )
-def test_a_branch_holds_to_its_belief_and_the_course_stays(belief: Assumption) -> None:
+def test_a_branch_enforces_its_assumption_and_its_parent_is_unchanged(belief: Assumption) -> None:
     it = at()
     branch = it.branch(belief)
     assert is_so(branch, belief)
@@ -77,7 +77,7 @@ def is_so(it: Stepper, belief: Assumption) -> bool:
     return False
 
 
-def test_a_branch_without_beliefs_is_the_very_course() -> None:
+def test_a_branch_without_assumptions_equals_its_parent() -> None:
     it = at(17)
     branch = it.branch()
     made: list[bytes] = []
@@ -91,7 +91,7 @@ def test_a_branch_without_beliefs_is_the_very_course() -> None:
         branch.go(16)
 
 
-def test_other_rules_and_tasks_say_something_else_on_a_branch() -> None:
+def test_other_rules_and_tasks_apply_on_a_branch() -> None:
     it = at(10)
     rules = it.branch(reasoners=with_rules(it.agent.reasoners, RULE))
     rules.step(20)
@@ -109,7 +109,7 @@ def test_other_rules_and_tasks_say_something_else_on_a_branch() -> None:
     assert [t.task for t in it.mind.tasks] == ["dock"]
 
 
-def test_an_answer_in_the_past_is_given_on_a_branch() -> None:
+def test_an_answer_in_the_past_starts_a_branch() -> None:
     it = at(40)
     it.go(30)
     branch = it.branch()
@@ -147,7 +147,7 @@ GOOD = {
 
 
 @pytest.mark.parametrize("text", list(GOOD))
-def test_beliefs_can_be_told_in_words(text: str) -> None:
+def test_assumptions_can_be_given_as_text(text: str) -> None:
     assert parse_assumption(reasoning_course()[-1].mind, text.split()) == GOOD[text]
 
 
@@ -165,7 +165,7 @@ def test_beliefs_can_be_told_in_words(text: str) -> None:
         ("object 1 arn", "did you mean 'arm'"),
     ],
 )
-def test_what_is_no_belief_is_refused_in_words(text: str, said: str) -> None:
+def test_invalid_assumptions_are_refused_with_a_message(text: str, said: str) -> None:
     with pytest.raises(SettingsError) as fault:
         parse_assumption(reasoning_course()[-1].mind, text.split())
     assert said in str(fault.value)

@@ -27,7 +27,7 @@ OBEYED = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud80
 
 
 @given(st.text(st.characters(codec=None)))
-def test_what_is_printed_is_obeyed_by_no_terminal_and_loses_nothing_else(text: str) -> None:
+def test_control_characters_are_removed_and_nothing_else(text: str) -> None:
     told = printable(text)
     assert not OBEYED.search(told)
     assert printable(told) == told
@@ -37,14 +37,14 @@ def test_what_is_printed_is_obeyed_by_no_terminal_and_loses_nothing_else(text: s
 
 
 @given(st.text(st.characters(codec=None)))
-def test_as_json_nothing_is_lost(text: str) -> None:
+def test_json_output_is_lossless(text: str) -> None:
     told = escaped_json({"text": text}, ensure_ascii=False)
     assert not OBEYED.search(told)
     assert json.loads(told) == {"text": text}
 
 
 @pytest.mark.parametrize("terminal", [False, True])
-def test_rich_prints_its_colours_and_nothing_of_others(terminal: bool) -> None:
+def test_only_colours_of_rich_reach_the_terminal(terminal: bool) -> None:
     out = io.StringIO()
     console = make_console(file=out, force_terminal=terminal, width=200)
     table = Table(title=EVIL)
@@ -58,7 +58,7 @@ def test_rich_prints_its_colours_and_nothing_of_others(terminal: bool) -> None:
     assert ("\x1b[" in out.getvalue()) == terminal
 
 
-def test_nothing_in_visup_prints_but_the_console() -> None:
+def test_only_the_console_module_prints() -> None:
     assert [
         f"{path.relative_to(ROOT)}:{node.lineno}: {ast.unparse(node.func)}"
         for part in ("visup", "agent", "rules", "tasks", "percepts")
@@ -81,7 +81,7 @@ ALLOWED = {
 }
 
 
-def test_the_report_runs_its_own_scripts_and_no_other() -> None:
+def test_only_scripts_of_the_report_may_run() -> None:
     pytest.importorskip("plotly", reason="the extra visup[report] is not installed")
     from tests.report.page.test_html import data
     from visup.report.page.html import report_page
@@ -96,7 +96,7 @@ def test_the_report_runs_its_own_scripts_and_no_other() -> None:
     assert all(f"'sha256-{h}'" in policy[1] for h in hashes)
 
 
-def test_the_path_of_a_file_that_is_no_text_is_printed(tmp_path: Path) -> None:
+def test_a_path_that_is_not_text_is_printed(tmp_path: Path) -> None:
     assert printable(str(tmp_path) + "/\udcff").endswith("/")
 
 
@@ -112,7 +112,7 @@ def test_the_path_of_a_file_that_is_no_text_is_printed(tmp_path: Path) -> None:
         ("task", "check", f"{EVIL}.task"),
     ],
 )
-def test_what_the_command_refuses_is_quoted_printable(
+def test_refused_arguments_are_quoted_without_control_characters(
     words: tuple[str, ...], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     result = caller(monkeypatch, capfd)(*(w.replace("\ud800", "") for w in words))

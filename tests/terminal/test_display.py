@@ -57,7 +57,7 @@ NOT_SHOWN = (
 
 
 @pytest.mark.parametrize("name", [n for n in agent.__all__ if n[0].isupper()])
-def test_public_records_of_the_agent_show_themselves(name: str) -> None:
+def test_public_records_of_the_agent_have_a_display(name: str) -> None:
     kind = getattr(agent, name)
     if hasattr(kind, "__dataclass_fields__") and name not in NOT_SHOWN:
         assert hasattr(kind, "_repr_html_")
@@ -68,7 +68,7 @@ def test_html_is_escaped() -> None:
     assert "<script" not in html(Directive("ask", "<script>alert(1)</script>"))
 
 
-def test_the_agent_alone_draws_nothing_and_imports_no_drawing() -> None:
+def test_the_agent_imports_no_drawing() -> None:
     code = "import visup.agent, visup.agent.cycle.agent, sys; print([m for m in sys.modules if m == 'rich'])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

@@ -22,14 +22,14 @@ def printed(*events: Event, terminal: bool = True) -> str:
     return out.getvalue()
 
 
-def test_a_pipe_is_given_one_line_for_each_event_neither_wrapped_nor_padded() -> None:
+def test_in_a_pipe_each_event_is_one_unwrapped_line() -> None:
     words = ("word " * 40).strip()
     assert printed(event(words), event("It is."), terminal=False) == (
         f"  12.3 s   {words}\n  12.3 s   It is.\n"
     )
 
 
-def test_what_is_said_twice_in_a_step_is_told_once_and_gravely() -> None:
+def test_repeated_sentences_of_a_step_are_merged_with_the_highest_severity() -> None:
     told = worded_once(
         [event("It fails."), event("It rains."), event("It fails.", Severity.WARNING)]
     )
@@ -39,12 +39,12 @@ def test_what_is_said_twice_in_a_step_is_told_once_and_gravely() -> None:
     ]
 
 
-def test_the_same_words_in_another_step_are_told_again() -> None:
+def test_the_same_sentence_in_another_step_is_printed_again() -> None:
     again = replace(event("It is hidden."), frame_index=400)
     assert len(worded_once([event("It is hidden."), again])) == 2
 
 
-def test_grave_events_of_one_reason_are_told_by_the_gravest() -> None:
+def test_severe_events_with_the_same_reason_are_merged() -> None:
     told = worded_once(
         [
             event("Stage `a` has failed: it moved.", Severity.WARNING, "stage_failed"),
@@ -57,7 +57,7 @@ def test_grave_events_of_one_reason_are_told_by_the_gravest() -> None:
     assert told[0].severity is Severity.CRITICAL
 
 
-def test_long_sentences_go_on_below_themselves_within_80_columns() -> None:
+def test_long_sentences_wrap_in_their_column_within_80_columns() -> None:
     lines = printed(event("word " * 40)).splitlines()
     assert len(lines) > 2
     assert all(len(line.rstrip()) <= 80 for line in lines)
@@ -65,10 +65,10 @@ def test_long_sentences_go_on_below_themselves_within_80_columns() -> None:
     assert lines[1].startswith(" " * 11 + "word")
 
 
-def test_words_that_look_like_markup_are_printed_as_they_are() -> None:
+def test_text_that_looks_like_markup_is_printed_unchanged() -> None:
     assert "[bold]x[/bold] [nonsense]" in printed(event("[bold]x[/bold] [nonsense]"))
 
 
-def test_every_verdict_has_words() -> None:
+def test_every_verdict_has_a_text() -> None:
     words = {verdict_line(v) for v in (*Verdict, None)}
     assert len(words) == len(Verdict) + 1

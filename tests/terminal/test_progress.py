@@ -19,12 +19,12 @@ from visup.commands.watch import LAG_SHOWN_S, pace_text, progress_bar
         (1, 0.5, None, ""),  # too early to tell
     ],
 )
-def test_pace_and_lag_are_told(done: int, took_s: float, lag_s: float | None, told: str) -> None:
+def test_pace_and_lag_are_printed(done: int, took_s: float, lag_s: float | None, told: str) -> None:
     assert pace_text(done, took_s, lag_s) == told
 
 
 @pytest.mark.parametrize(("terminal", "shown"), [(True, True), (False, True), (True, False)])
-def test_a_terminal_is_shown_how_much_is_done_and_how_long_it_takes(
+def test_a_terminal_shows_progress_and_remaining_time(
     terminal: bool, shown: bool
 ) -> None:
     out = StringIO()

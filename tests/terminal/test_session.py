@@ -63,7 +63,7 @@ def test_commands_move_the_agent(commands: list[str], frame: int) -> None:
         ("relations x", "relations [ID]"),
     ],
 )
-def test_what_is_refused_leaves_the_session_where_it_was(command: str, told: str) -> None:
+def test_refused_commands_do_not_move_the_session(command: str, told: str) -> None:
     it, out = session()
     assert it.run(["step 5", command]) == 2
     assert told in out.getvalue()
@@ -87,7 +87,7 @@ def test_help_names_every_command_and_fits_80_columns() -> None:
     assert all(len(line) <= 80 for line in HELP.splitlines())
 
 
-def test_the_end_of_the_source_is_told() -> None:
+def test_the_end_of_the_source_is_printed() -> None:
     it, out = session(3)
     it.run(["run", "step"])
     assert "the source has ended" in out.getvalue()
@@ -185,7 +185,7 @@ def test_every_command_has_its_help_and_no_other() -> None:
         ("go st", {"start"}),
     ],
 )
-def test_words_are_completed(line: str, wanted: set[str]) -> None:
+def test_commands_are_completed(line: str, wanted: set[str]) -> None:
     it, _ = reasoning_session()
     it.stepper.step(28)
     found = set(completions(it, line))

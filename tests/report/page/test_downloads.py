@@ -23,7 +23,7 @@ CELLS = st.text(st.characters(exclude_categories=["Cs", "Cc"]), max_size=12)
 
 
 @given(st.lists(st.fixed_dictionaries({"time": st.floats(0, 99), "text": CELLS}), min_size=1))
-def test_csv_is_read_back_and_holds_no_formula(rows: list[dict[str, object]]) -> None:
+def test_csv_can_be_read_back_and_contains_no_formula(rows: list[dict[str, object]]) -> None:
     back = list(csv.DictReader(StringIO(csv_bytes(rows).decode())))
     assert [float(r["time"]) for r in back] == [r["time"] for r in rows]
     for was, now in zip(rows, back, strict=True):
@@ -31,7 +31,7 @@ def test_csv_is_read_back_and_holds_no_formula(rows: list[dict[str, object]]) ->
         assert now["text"].removeprefix("'") == str(was["text"]).removeprefix("'")
 
 
-def test_parquet_holds_the_same_as_the_run() -> None:
+def test_parquet_has_the_data_of_the_run() -> None:
     parquet = pytest.importorskip("pyarrow.parquet", reason="needs the extra `tables`")
     for rows in tables_of(data()).values():
         made = parquet_bytes(rows)
@@ -50,7 +50,7 @@ TABLE = st.fixed_dictionaries(
 
 
 @given(st.lists(TABLE, min_size=1))
-def test_texts_and_numbers_stay_what_they_are_in_parquet(rows: list[dict[str, object]]) -> None:
+def test_types_are_kept_in_parquet(rows: list[dict[str, object]]) -> None:
     parquet = pytest.importorskip("pyarrow.parquet", reason="needs the extra `tables`")
     made = parquet_bytes(rows)
     assert made is not None

@@ -99,7 +99,7 @@ def test_the_page_is_well_formed() -> None:
     assert len(ids) == len(set(ids))
 
 
-def test_every_part_of_the_run_is_told() -> None:
+def test_every_part_of_the_run_is_on_the_page() -> None:
     text = page().text
     told = [sentence for events in TOLD.values() for _, _, sentence, _ in events]
     alert = data().alerts[0]
@@ -136,14 +136,14 @@ def test_the_annotated_videos_beside_the_page_are_linked() -> None:
     assert "Annotated video, part 2" in " ".join(linked.words)
 
 
-def test_names_in_prose_stand_in_quotes() -> None:
+def test_names_in_prose_are_quoted() -> None:
     told = Event("stage_done", 1.0, 1, "Stage `captured` is complete.")
     words = " ".join(Page(report_page(replace(data(), events=(told,)))).words)
     assert "Stage 'captured' is complete." in words
     assert "`" not in words
 
 
-def test_the_page_asks_nothing_of_the_network() -> None:
+def test_the_page_loads_nothing_from_the_network() -> None:
     for value in page().values("src", "href", "action", "data", "poster", "srcset"):
         assert value.startswith((*INSIDE, "#"))
     assert not [t for t, _ in page().tags if t in ("link", "iframe", "object", "embed", "base")]
@@ -170,7 +170,7 @@ def test_figures_in_the_page_are_those_that_its_script_draws() -> None:
     assert "Plotly" in page().scripts[1]
 
 
-def test_what_the_user_wrote_cannot_run() -> None:
+def test_text_of_users_cannot_run_as_script() -> None:
     evil = data(EVIL)
     evil = replace(
         evil,
@@ -210,7 +210,7 @@ def test_what_the_user_wrote_cannot_run() -> None:
 
 @given(text=st.text(max_size=40))
 @settings(max_examples=60, deadline=None)
-def test_any_sentence_survives_the_way_to_the_page(text: str) -> None:
+def test_every_sentence_is_on_the_page_unchanged(text: str) -> None:
     event = Event("entry", 1.0, 0, text, severity=Severity.WARNING)
     shown = Page(narrative(RunData("x", events=(event,))))
     clean = text.replace("\0", "�").replace("\r\n", "\n").replace("\r", "\n")
@@ -241,7 +241,7 @@ def test_a_run_without_objects_or_task_has_a_page_too() -> None:
     assert "It followed no object." in shown.text
 
 
-def test_the_report_is_written_whole_and_stays_small(tmp_path: Path) -> None:
+def test_the_report_is_written_atomically_and_is_small(tmp_path: Path) -> None:
     path = tmp_path / "report.html"
     path.write_text("an older report")
     write_report(data(), path)
@@ -250,7 +250,7 @@ def test_the_report_is_written_whole_and_stays_small(tmp_path: Path) -> None:
     assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
 
 
-def test_an_unwritable_place_is_told(tmp_path: Path) -> None:
+def test_an_unwritable_path_is_reported(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="cannot be written"):
         write_report(RunData("x"), tmp_path / "missing" / "report.html")
 
@@ -298,7 +298,7 @@ def test_fitted_lines_find_the_speed(slope: float, start: float, count: int, noi
     assert line.end - line.start == pytest.approx(line.slope * (times[-1] - times[0]), abs=1e-6)
 
 
-def test_moments_of_touch_do_not_bend_the_line() -> None:
+def test_samples_with_contact_do_not_affect_fitted_lines() -> None:
     times = [float(t) for t in range(20)]
     gaps = [max(0.0, 50.0 - 10.0 * t) for t in times]
     span = StateSpan(("relation", "1", "2"), "converging", 0.0, 19.0)
@@ -308,7 +308,7 @@ def test_moments_of_touch_do_not_bend_the_line() -> None:
     assert fitted_lines(times, [0.0] * 20, [span]) == ()
 
 
-def test_votes_that_were_not_kept_are_unknown() -> None:
+def test_missing_votes_are_unknown() -> None:
     samples = [
         replace(s, votes={1: {"a": 1.0}} if i % 2 else {1: {"b": 1.0}})
         for i, s in enumerate(data().samples)
@@ -322,7 +322,7 @@ def test_spans_with_too_few_points_have_no_line() -> None:
     assert fitted_lines([0.0, 1.0, 1.2, 2.0], [1.0, 2.0, 3.0, 4.0], [span]) == ()
 
 
-def test_the_distance_figure_tells_both_phases() -> None:
+def test_the_distance_figure_describes_both_trends() -> None:
     (figure,) = distance_figures(data())
     assert "converging from 0.0 to 6.2 s at -" in figure.caption
     assert "diverging from 6.2 to 12.0 s at +" in figure.caption
@@ -339,7 +339,7 @@ def test_events_lead_to_the_nearest_key_frame() -> None:
     assert nearest((), event) is None
 
 
-def test_a_coupling_is_a_band_and_has_no_line() -> None:
+def test_a_coupling_is_a_band_without_a_line() -> None:
     coupled = StateSpan(("relation", "1", "2"), "coupled", 8.0, 9.5)
     (figure,) = distance_figures(replace(data(), spans=(*data().spans, coupled)))
     bands = [s for s in figure.layout["shapes"] if s["type"] == "rect"]

@@ -42,7 +42,7 @@ def moved_to(page: Browser, seconds: float) -> None:
     )
 
 
-def test_the_video_covers_nothing_until_a_moment_is_asked_for(page: Browser) -> None:
+def test_the_video_is_hidden_until_a_moment_is_chosen(page: Browser) -> None:
     page.open(page.value("location.href"))
     video = "document.querySelector('#cursor video')"
     page.until(f"{video}?.readyState >= 1")
@@ -76,7 +76,7 @@ def test_the_slider_moves_video_figures_and_text(page: Browser) -> None:
     assert len(lines) >= 4
 
 
-def test_a_move_before_the_length_of_the_video_is_known_is_made_good(page: Browser) -> None:
+def test_a_seek_before_the_video_has_loaded_is_applied_later(page: Browser) -> None:
     video = "document.querySelector('#cursor video')"
     moved_to(page, 4.0)
     page.value(f"{video}.currentTime = 0")
@@ -98,7 +98,7 @@ def test_a_click_into_a_figure_moves_the_cursor(page: Browser) -> None:
     page.until("Math.abs(Number(document.querySelector('#cursor input').value) - 3) < 0.1")
 
 
-def test_the_list_of_alerts_is_cut_down(page: Browser) -> None:
+def test_the_list_of_alerts_can_be_filtered(page: Browser) -> None:
     shown = "[...document.querySelectorAll('.alert')].filter((a) => !a.hidden).length"
     assert page.value(shown) == len(ALERTS)
     change = (
@@ -112,7 +112,7 @@ def test_the_list_of_alerts_is_cut_down(page: Browser) -> None:
     assert page.value("document.querySelector('.alert-filter output').textContent") == "1 of 4"
 
 
-def test_nothing_stands_out_beyond_a_narrow_screen(page: Browser) -> None:
+def test_the_page_fits_a_narrow_screen(page: Browser) -> None:
     page.call(
         "Emulation.setDeviceMetricsOverride",
         width=390,

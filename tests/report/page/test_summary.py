@@ -13,7 +13,7 @@ from visup.report.records import RunData
 from visup.terminal.narrator import verdict_line
 
 
-def test_a_run_that_was_not_judged_claims_nothing() -> None:
+def test_a_run_without_a_verdict_claims_none() -> None:
     judged = replace(data(), verdict=Verdict.SUCCEEDED)
     assert verdict_words(judged)[0] == "Succeeded"
     assert verdict_words(replace(judged, verdict=None))[0] == "No verdict"
@@ -21,7 +21,7 @@ def test_a_run_that_was_not_judged_claims_nothing() -> None:
     assert verdict_words(quiet)[0].lower() in verdict_line(None)  # as the terminal has it
 
 
-def test_a_report_without_a_task_tells_system_alerts_from_what_was_seen() -> None:
+def test_without_a_task_system_alerts_do_not_count_as_unsafe() -> None:
     alert = Alert(1, "sink_failed", Severity.WARNING, 1.0, 1.0, (), "The sink fails.")
     run = replace(data(), tasks=(), alerts=(alert,), verdict=None)
     assert verdict_words(run)[0] == "Nothing unsafe was seen"
@@ -32,14 +32,14 @@ def test_a_report_without_a_task_tells_system_alerts_from_what_was_seen() -> Non
     assert unsure[0].lower() in verdict_line(Verdict.UNKNOWN, has_task=False)
 
 
-def test_the_summary_is_made_of_sentences() -> None:
+def test_the_summary_consists_of_sentences() -> None:
     tasks = tuple(replace(t, evidence="they were apart ") for t in data().tasks)
     assert " They were apart. One alert was raised, at 7.0 s: " in summary(
         replace(data(), tasks=tasks)
     )
 
 
-def test_the_summary_says_a_reason_once() -> None:
+def test_the_summary_gives_a_reason_once() -> None:
     (alert,) = data().alerts
     tasks = tuple(replace(t, evidence="they were apart") for t in data().tasks)
     alert = replace(alert, cause="The stage 'captured' is failing: they were apart.")

@@ -41,7 +41,7 @@ def told(html: str) -> list[tuple[str, str, list[list[object]]]]:
     return [(status, unescape(stage), json.loads(unescape(data))) for status, data, stage in found]
 
 
-def test_each_stage_ends_in_the_colour_in_which_the_task_ended() -> None:
+def test_each_stage_has_the_colour_of_its_final_status() -> None:
     ended = {s.stage: s.status.value for s in scene().tasks[0].stages}
     shown = told(task_trees(scene()))
     assert {stage: status for status, stage, _ in shown} == ended
@@ -58,7 +58,7 @@ def test_the_slider_has_every_change_of_the_run() -> None:
 
 
 @given(st.lists(st.tuples(st.floats(0, 99), st.sampled_from(list(Status))), max_size=8))
-def test_changes_come_in_order_and_of_one_stage_only(moments: list[tuple[float, Status]]) -> None:
+def test_changes_of_a_stage_are_in_order(moments: list[tuple[float, Status]]) -> None:
     spans = [StateSpan(("stage", "t", "a"), s.value, at, at + 1) for at, s in moments]
     other = StateSpan(("stage", "t", "b"), "done", 0, 1)
     found = stage_changes(RunData("x", spans=(*spans, other)), "t", "a")
@@ -66,7 +66,7 @@ def test_changes_come_in_order_and_of_one_stage_only(moments: list[tuple[float, 
     assert sorted(v for _, v in found) == sorted(s.value for s in spans)
 
 
-def test_what_a_file_says_is_never_read_as_markup() -> None:
+def test_text_of_files_is_escaped() -> None:
     evil = "<script>alert(1)</script>\"'"
     tree = Branch(evil, "task", "", (Branch(evil, "stage", evil), Branch(evil, "words", evil)))
     data = RunData("x", spans=(StateSpan(("stage", evil, evil), "done", 0, 1),), task_trees=(tree,))

@@ -26,12 +26,12 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> RecordedRun:
     return run
 
 
-def test_nothing_that_was_told_is_missing(record: RecordedRun, tmp_path: Path) -> None:
+def test_everything_reported_is_in_the_journal(record: RecordedRun, tmp_path: Path) -> None:
     assert len(record.done) > 200
     assert lost_in_cuts(record, POINTS, 3, tmp_path / "again") == [[]] * POINTS
 
 
-def test_a_disk_that_syncs_nothing_loses_something(record: RecordedRun, tmp_path: Path) -> None:
+def test_a_disk_without_sync_loses_data(record: RecordedRun, tmp_path: Path) -> None:
     """The test above can fail: without syncs what was told is lost."""
     folder, told, done = record.folder, record.told, record.done
     rng, said, disk = random.Random(3), "", ForgetfulDisk()
@@ -47,7 +47,7 @@ def test_a_disk_that_syncs_nothing_loses_something(record: RecordedRun, tmp_path
     assert lost
 
 
-def test_a_run_goes_on_after_the_power_was_lost(record: RecordedRun, tmp_path: Path) -> None:
+def test_a_run_can_be_resumed_after_a_power_failure(record: RecordedRun, tmp_path: Path) -> None:
     folder, done = record.folder, record.done
     disk, rng = ForgetfulDisk(), random.Random(5)
     for operation in done[: 2 * len(done) // 3]:

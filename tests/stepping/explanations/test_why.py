@@ -20,7 +20,7 @@ def it() -> Stepper:
     return stepper
 
 
-def test_an_alert_goes_back_to_the_percepts_of_the_frame_that_opened_it(it: Stepper) -> None:
+def test_an_alert_is_explained_by_the_percepts_of_its_opening_frame(it: Stepper) -> None:
     why = it.why("alert 1")
     assert (why.frame_index, why.text.split(":")[0]) == (15, "alert 1, unexpected_object")
     texts = [w.text for w in why.walk()]
@@ -64,7 +64,7 @@ def test_a_stage_is_explained_with_what_was_last_reported_of_it(it: Stepper) -> 
     assert all("Stage 'approach'" in w.line() for w in reported.parts)
 
 
-def test_records_themselves_can_be_asked_about(it: Stepper) -> None:
+def test_records_can_be_explained_directly(it: Stepper) -> None:
     mind = it.mind
     asked = [mind.alerts[0], mind.objects[1], mind.tasks[0], mind.tasks[0].stages[0]]
     asked += [next(iter(mind.relations))]
@@ -99,11 +99,11 @@ MISSING = {
 
 
 @pytest.mark.parametrize("text", MISSING)
-def test_what_is_missing_is_told(it: Stepper, text: str) -> None:
+def test_unmet_conditions_are_explained(it: Stepper, text: str) -> None:
     assert any(MISSING[text] in w.text for w in it.why_not(text).walk())
 
 
-def test_what_was_missing_then_is_told_of_the_past() -> None:
+def test_unmet_conditions_of_past_steps_are_explained() -> None:
     it = reasoning_stepper()
     it.step(6)
     entry = [w.text for w in it.why_not("entry 1").walk()]
@@ -116,18 +116,18 @@ def test_what_was_missing_then_is_told_of_the_past() -> None:
 @pytest.mark.parametrize(
     "text", ["", "nonsense", "alert 7", "object 9", "touching 1 9", "relation", "rule nothing 1"]
 )
-def test_what_nobody_knows_is_refused_in_words(it: Stepper, text: str) -> None:
+def test_unknown_subjects_are_refused_with_a_message(it: Stepper, text: str) -> None:
     with pytest.raises(VisupError):
         it.why(text)
 
 
 @pytest.mark.parametrize("text", ["", "coupled 1", "object 1", "entry 9", "stage nothing"])
-def test_what_cannot_be_missing_is_refused_in_words(it: Stepper, text: str) -> None:
+def test_invalid_why_not_questions_are_refused_with_a_message(it: Stepper, text: str) -> None:
     with pytest.raises(VisupError):
         it.why_not(text)
 
 
-def test_reasons_show_themselves() -> None:
+def test_reasons_have_a_display() -> None:
     why = Why("a", (Why("b", (Why("c"),)),), 3, 0.5)
     assert str(why) == "a [frame 3, 0.50 s]\n  b\n    c"
     assert "frame 3" in html(why)
