@@ -14,9 +14,9 @@ from visup.report.records import StateSpan
 @given(max_items=st.integers(2, 40), count=st.integers(0, 500))
 @settings(max_examples=100, deadline=None)
 def test_samples_of_a_stream_are_even_from_its_start_and_limited(
-    most: int, count: int
+    max_items: int, count: int
 ) -> None:
-    kept = EvenSample[int](most)
+    kept = EvenSample[int](max_items)
     made: list[int] = []
 
     def make(i: int) -> int:
@@ -26,11 +26,11 @@ def test_samples_of_a_stream_are_even_from_its_start_and_limited(
     for i in range(count):
         kept.offer(partial(make, i))
     items = kept.items()
-    assert len(items) <= most
+    assert len(items) <= max_items
     if count:
         stride = items[1] - items[0] if len(items) > 1 else max(count, 1)
         assert list(items) == list(range(0, count, stride))
-        assert len(items) >= min(count, most // 2)
+        assert len(items) >= min(count, max_items // 2)
     assert set(items) <= set(made)
     assert len(made) <= count
 
@@ -40,12 +40,14 @@ def test_samples_of_a_stream_are_even_from_its_start_and_limited(
     max_items=st.integers(1, 10),
 )
 @settings(max_examples=100, deadline=None)
-def test_the_heaviest_items_are_kept_and_among_equals_the_earlier(weights: list[int], most: int) -> None:
-    kept = TopWeighted[tuple[int, int]](most, lambda x: x[1])
+def test_the_heaviest_items_are_kept_and_among_equals_the_earlier(
+    weights: list[int], max_items: int
+) -> None:
+    kept = TopWeighted[tuple[int, int]](max_items, lambda x: x[1])
     for item in enumerate(weights):
         if kept.would_keep(item[1]):
             kept.add(item)
-    best = sorted(enumerate(weights), key=lambda x: (-x[1], x[0]))[:most]
+    best = sorted(enumerate(weights), key=lambda x: (-x[1], x[0]))[:max_items]
     assert list(kept.items()) == sorted(best)
 
 

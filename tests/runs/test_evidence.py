@@ -169,7 +169,9 @@ def test_a_resumed_process_finishes_the_clip_and_has_its_links(run: Path) -> Non
     resumed.close()
 
 
-def test_a_full_disk_is_reported_and_stops_nothing(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_is_reported_and_stops_nothing(
+    run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     keeper = EvidenceKeeper(run, OPTIONS, 10.0)
 
     def no_room(spool: ClipSpool, frame: EncodedFrame) -> None:

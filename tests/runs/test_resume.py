@@ -149,7 +149,9 @@ def test_an_incompatible_checkpoint_is_reported_and_all_frames_perceived_again(
     assert f"another form than visup {__version__} has" in note
 
 
-def test_the_report_of_a_resumed_run_covers_the_whole_run(clip: WatchSettings, tmp_path: Path) -> None:
+def test_the_report_of_a_resumed_run_covers_the_whole_run(
+    clip: WatchSettings, tmp_path: Path
+) -> None:
     pytest.importorskip("plotly", reason="the extra visup[report] is not installed")
     options = RunOptions(video=False, state_every_s=0.2)
     broken_run(clip, tmp_path / "run", 30, options)

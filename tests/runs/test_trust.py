@@ -111,9 +111,7 @@ def test_a_live_run_is_not_resumed_and_loses_nothing(clip: WatchSettings, tmp_pa
     assert (run.count(), run.facts()["ended"]) == (12, "complete")
 
 
-def test_a_run_resumed_by_another_process_is_refused(
-    clip: WatchSettings, tmp_path: Path
-) -> None:
+def test_a_run_resumed_by_another_process_is_refused(clip: WatchSettings, tmp_path: Path) -> None:
     broken_run(clip, tmp_path / "run", 5, RunOptions(video=False, report=False, state_every_s=0))
     first, second = interrupted_run(tmp_path / "run"), interrupted_run(tmp_path / "run")
     supervise(first.settings, tmp_path / "run", options=BARE, past=first)

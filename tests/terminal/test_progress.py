@@ -24,9 +24,7 @@ def test_pace_and_lag_are_printed(done: int, took_s: float, lag_s: float | None,
 
 
 @pytest.mark.parametrize(("terminal", "shown"), [(True, True), (False, True), (True, False)])
-def test_a_terminal_shows_progress_and_remaining_time(
-    terminal: bool, shown: bool
-) -> None:
+def test_a_terminal_shows_progress_and_remaining_time(terminal: bool, shown: bool) -> None:
     out = StringIO()
     console = Console(file=out, force_terminal=terminal, width=100)
     with progress_bar(console, "watching", shown=shown) as tell:

@@ -32,7 +32,9 @@ def can_mount() -> bool:
 
 @pytest.mark.skipif(not can_mount(), reason="no small disk can be made here")
 @pytest.mark.parametrize("size_kb", [200])
-def test_a_full_disk_is_reported_and_leaves_no_temporary_files(tmp_path: Path, size_kb: int) -> None:
+def test_a_full_disk_is_reported_and_leaves_no_temporary_files(
+    tmp_path: Path, size_kb: int
+) -> None:
     clip = write_clip(tmp_path / "clip.avi", moving_disc(12, size=(320, 240)), fps=10.0)
     small, told = tmp_path / "small", tmp_path / "told"
     small.mkdir()
