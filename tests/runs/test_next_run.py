@@ -72,7 +72,7 @@ class Camera:
         run = supervised(
             past.settings if past else self.settings,
             place,
-            Audience(run_folders=self.store),
+            Audience(folders=self.store),
             options,
             past,
         )

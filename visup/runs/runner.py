@@ -177,13 +177,9 @@ class _SupervisedRun:
         """Restore the agent, and return the remaining frames."""
         past, restored = self._load_state(past)
         on_step = self._recorder.catch_up if self._recorder else lambda step, frame: None
+        send_missed = self._sinks.alerts.send_missed
         frames, notes = catch_up(
-            self._agent,
-            self.source,
-            past,
-            on_step,
-            self._sinks.alerts.send_missed,
-            restored=restored,
+            self._agent, self.source, past, on_step, send_missed, restored=restored
         )
         self._notes = (*self._notes, *notes)
         return frames
@@ -279,7 +275,7 @@ class _SupervisedRun:
                         self._agent, step, lambda: recorder_state(self._recorder)
                     )
                 self._report_figures(step, audience)
-                if audience.run_folders and self._recorder and self.source.live:
+                if audience.folders and self._recorder and self.source.live:
                     self._roll(step, self._recorder, audience)
                 yield step
         except KeyboardInterrupt:
@@ -287,10 +283,10 @@ class _SupervisedRun:
 
     def _roll(self, step: Step, old: Recorder, audience: Audience) -> None:
         """Start the next run if it is due: the same agent with a new journal."""
-        if not (audience.run_folders and self._roll_over.due(step.time, old.journal.size)):
+        if not (audience.folders and self._roll_over.due(step.time, old.journal.size)):
             return
         try:
-            new, checkpoints = self._next_recorder(step, old, audience.run_folders)
+            new, checkpoints = self._next_recorder(step, old, audience.folders)
         except OutputError as fault:
             self._roll_over.failed(step.time)
             if audience.notice:
@@ -310,21 +306,21 @@ class _SupervisedRun:
         self._roll_over.finish_files(old, before, result, mind.tasks)
 
     def _next_recorder(
-        self, step: Step, old: Recorder, run_folders: RunFolders
+        self, step: Step, old: Recorder, folders: RunFolders
     ) -> tuple[Recorder, CheckpointWriter]:
         """The journal and the checkpoint of the next run, from which it can already be resumed.
 
         Raises:
             OutputError: They cannot be written.
         """
-        folder = fresh_folder(run_folders.next_folder(), self._settings.source)
+        folder = fresh_folder(folders.next_folder(), self._settings.source)
         new: Recorder | None = None
         try:
             new = Recorder(self._settings, self.source, folder, self._options)
             new.journal.note(continues=old.folder.name, clock=self._stamp.clock.anchors)
             checkpoints = CheckpointWriter(folder, self._options.state_every_s)
             checkpoints.keep(self._agent, step, recorder_state(new))
-            run_folders.set_current(folder)
+            folders.set_current(folder)
         except OutputError:
             if new:
                 new.close()

@@ -113,7 +113,7 @@ def watch_camera(job: CameraJob, pipe: ReportPipe) -> ExitCode:
     audience = Audience(
         observers=(heartbeat,),
         figures=heartbeat.beat,
-        run_folders=_ReportingRunStore(job.folder.parent, job.fingerprint, pipe),
+        folders=_ReportingRunStore(job.folder.parent, job.fingerprint, pipe),
         notice=lambda text: pipe.send(ReportKind.NOTICE, text=text),
     )
     try:

@@ -53,7 +53,7 @@ class Audience:
         operator: Answers questions; None by default.
         notice: Receives messages that cannot wait for a step, such as that a camera dropped: one sentence.
         figures: Receives the figures after each step.
-        run_folders: Folders for runs that follow a live one; None if none follows.
+        folders: Folders for runs that follow a live one; None if none follows.
     """
 
     observers: Sequence[Observer] = ()
@@ -61,4 +61,4 @@ class Audience:
     operator: HumanOperator | None = None
     notice: Callable[[str], None] | None = None
     figures: Callable[[RunFigures], None] | None = None
-    run_folders: RunFolders | None = None
+    folders: RunFolders | None = None
