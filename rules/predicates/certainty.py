@@ -6,15 +6,19 @@ larger one, may be a part of that; alarms that call for a person, or end a task,
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from visup.agent import ObjectBelief, Region
-from visup.rules.formula.truth import MAYBE, YES
+from visup.rules.formula.truth import MAYBE, NO, YES
 from visup.rules.geometry.regions import Box, image_diagonal
 from visup.rules.predicates._snapshot_jit import GAP
+from visup.rules.predicates.motion import moving
+from visup.rules.predicates.roles import is_actor
 from visup.rules.predicates.snapshot import Codes, Snapshot, code
 from visup.rules.presence.fragments import FragmentSettings
 from visup.rules.presence.object_tracks import presence_memory
@@ -28,6 +32,11 @@ LEAST_CONFIDENCE = 0.5
 START_S = PresenceSettings().start_s
 ENTRY_DISTANCE = 0.5
 """Greatest distance from the border of the first sighting of an object that came over it, in its sizes."""
+LINK_SPEED = 2.0
+"""Greatest speed of a part of a machine, in speeds of the next part on the way to the actor."""
+LINK_DISTANCE = 0.5
+"""Greatest gap between two visible parts of a machine, in sizes of the part: what is between them may not be
+seen."""
 ENTRY_ADVANCE = 0.25
 """How far its far side must have moved away from that border since, in its sizes."""
 LEAST_VISIBLE = 0.5
@@ -70,15 +79,53 @@ def standalone(facts: Snapshot) -> Codes:
     )
 
 
+def near_moving_actor(facts: Snapshot) -> Codes:
+    """Whether an object is near an actor that moves, or near another object that is, and not much faster.
+
+    It may be a link of the machine that moves the actor: an upper arm, whose forearm may not be seen. A link
+    is seldom faster than what it moves; who passes by may be.
+    """
+    beliefs = facts.beliefs
+    if not beliefs:
+        return facts.codes_of_ids(())
+    reach = LINK_DISTANCE * np.array([max(b.region.bbox[2:]) for b in beliefs], dtype=float)
+    gap = facts.pair_intervals(GAP)
+    near = np.isfinite(gap[1]) & (gap[0] <= reach[:, None])
+    speed = facts.one("speed")
+    as_slow = speed[:, None] <= LINK_SPEED * speed
+    start = (is_actor(facts) == YES) & (moving(facts) == YES)
+    near_it = _reached((near | near.T) & as_slow, start).tolist()
+    return facts.codes_of_ids(
+        {b.id for b, is_near in zip(beliefs, near_it, strict=True) if is_near}
+    )
+
+
+def _reached(near: NDArray[np.bool_], start: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(N,) bool: objects that are reached from the first ones by steps between neighbours.
+
+    Args:
+        near: (N, N) bool, whether each object is reached from each other one.
+        start: (N,) bool, the first objects.
+    """
+    reached = start
+    for _ in range(len(start)):
+        reached = reached | near[:, reached].any(axis=1)
+    return reached
+
+
 def whole(facts: Snapshot) -> Codes:
     """Whether an object is clear of the image border."""
-    width, height = facts.mind.frame_size
 
     def clear(region: Region) -> bool:
-        x, y, w, h = region.bbox
-        return not region.cut and x > 0 and y > 0 and x + w < width and y + h < height
+        return not region.cut and _is_inside(region.bbox, facts.mind.frame_size)
 
     return facts.codes_of_objects(lambda b: code(clear(b.region)))
+
+
+def _is_inside(box: Box, size: tuple[int, int]) -> bool:
+    """Whether a box is clear of the border of an image of that (width, height)."""
+    x, y, w, h = box
+    return x > 0 and y > 0 and x + w < size[0] and y + h < size[1]
 
 
 def came_in(facts: Snapshot) -> Codes:
@@ -87,15 +134,19 @@ def came_in(facts: Snapshot) -> Codes:
     An object that starts inside the picture was there before, is attached to something that was, or is its
     shadow. A fast one is first seen a little inside. An object that is first seen at the border and stays
     there may be attached to something outside, even if its region no longer reaches the border. And a
-    region that leaps, or shrinks to a remainder of itself, is hardly one object.
+    region that leaps, or shrinks to a remainder of itself, is hardly one object. What was whole when the
+    video began was there before.
     """
     memory, size = presence_memory(facts.mind), facts.mind.frame_size
+    begun = math.inf if memory.start is None else memory.start + START_S
 
     def evaluate(b: ObjectBelief) -> int:
         if b.id not in memory.tracks:
             return MAYBE
         track = memory.tracks[b.id]
         mostly_visible = track.visible_share >= LEAST_VISIBLE
+        if b.first_seen <= begun and _is_inside(track.first_box, size):
+            return NO
         return code(mostly_visible and _crossed_border(track.coherent_box, b.region.bbox, size))
 
     return facts.codes_of_objects(evaluate)

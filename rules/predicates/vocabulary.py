@@ -29,6 +29,7 @@ from visup.rules.predicates.coarse_relations import COARSE_RELATIONS
 from visup.rules.predicates.definitions import PredicateDefinition, QuantityDefinition, Vocabulary
 from visup.rules.predicates.motion import moving, moving_clearly
 from visup.rules.predicates.qualitative_words import allen_evaluator, tpcc_codes
+from visup.rules.predicates.roles import is_actor, is_bystander
 from visup.rules.predicates.snapshot import (
     RELATION_NAMES,
     SIGMAS,
@@ -81,19 +82,6 @@ def unexpected(facts: Snapshot) -> Codes:
     unexplained = [task.unexplained for task in facts.mind.tasks]
     unexplained_by_all = set(unexplained[0]).intersection(*unexplained[1:]) if unexplained else ()
     return facts.codes_of_ids(unexplained_by_all)
-
-
-def is_actor(facts: Snapshot) -> Codes:
-    """Whether an object plays an actor of an active task."""
-    bound = {b.object_id for task in facts.mind.tasks for b in task.bindings}
-    return facts.codes_of_ids(bound)
-
-
-def is_bystander(facts: Snapshot) -> Codes:
-    """Whether a task tolerates an object, and none uses it as an actor."""
-    tasks = facts.mind.tasks
-    actors = {b.object_id for task in tasks for b in task.bindings}
-    return facts.codes_of_ids({i for task in tasks for i in task.bystanders} - actors)
 
 
 def one_machine(facts: Snapshot) -> Codes:
@@ -225,6 +213,9 @@ PREDICATES: MappingProxyType[str, PredicateDefinition] = MappingProxyType(
         ),
         "came_in": PredicateDefinition(
             _ONE, certainty.came_in, "it came over the border of the image"
+        ),
+        "near_moving_actor": PredicateDefinition(
+            _ONE, certainty.near_moving_actor, "it is near an actor that moves, or near what is"
         ),
         "whole": PredicateDefinition(_ONE, certainty.whole, "it is clear of the image border"),
         **{

@@ -165,7 +165,7 @@ def _asks_for_nearness(fact: Fact) -> bool:
     return (
         isinstance(fact, Comparison)
         and action_of(fact).name in NEARNESS
-        and fact.operator in ("<", "<=")
+        and fact.operator in ("<", "<=", BETWEEN)
     )
 
 
