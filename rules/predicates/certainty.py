@@ -6,7 +6,6 @@ larger one, may be a part of that; alarms that call for a person, or end a task,
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import cv2
@@ -138,7 +137,7 @@ def came_in(facts: Snapshot) -> Codes:
     video began was there before.
     """
     memory, size = presence_memory(facts.mind), facts.mind.frame_size
-    begun = math.inf if memory.start is None else memory.start + START_S
+    begun = (memory.start or 0.0) + START_S
 
     def evaluate(b: ObjectBelief) -> int:
         if b.id not in memory.tracks:

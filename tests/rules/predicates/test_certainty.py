@@ -12,10 +12,16 @@ from hypothesis import strategies as st
 
 from tests.rules.runs import reason
 from tests.rules.scenes import box_region, seen
-from visup.agent import Candidate, Mind
+from visup.agent import Binding, Candidate, Mind, TaskBelief, Verdict
 from visup.agent.model.mind import Zone
 from visup.rules.formula.truth import YES
-from visup.rules.predicates.certainty import at_home, came_in, identified, standalone
+from visup.rules.predicates.certainty import (
+    at_home,
+    came_in,
+    identified,
+    near_moving_actor,
+    standalone,
+)
 from visup.rules.predicates.snapshot import Codes, Snapshot
 
 Rect = tuple[float, float, float, float]
@@ -111,3 +117,47 @@ def test_an_object_came_in_if_it_crossed_the_border_as_a_whole(
 ) -> None:
     mind = reason(seen(i, [box_region(1, box(i / 25))]) for i in range(60))[-1].mind
     assert ids_of_yes(mind, came_in(Snapshot(mind))) == ({1} if comes else set())
+
+
+@pytest.mark.parametrize(("x", "comes"), [(-10.0, True), (2.0, False)])
+def test_what_was_whole_when_the_video_began_did_not_come_in(x: float, comes: bool) -> None:
+    boxes = [(x + 100 * i / 25, 200, 100, 80) for i in range(40)]
+    mind = reason(seen(i, [box_region(1, box)]) for i, box in enumerate(boxes))[-1].mind
+    assert ids_of_yes(mind, came_in(Snapshot(mind))) == ({1} if comes else set())
+
+
+def links(hand_speed: float, link_speed: float, gap: float) -> Mind:
+    """A hand (1), which is an actor, a link (2) beside it, and one (3) beside that; pixels per second."""
+    size = 80.0
+
+    def boxes(t: float) -> list[Rect]:
+        x = 120.0 + link_speed * t
+        second, third = (
+            (x + size + gap, 200.0, size, size),
+            (x + 2 * (size + gap), 200.0, size, size),
+        )
+        return [(120.0 + hand_speed * t, 200.0, size, size), second, third]
+
+    frames = (
+        seen(i, [box_region(n + 1, b) for n, b in enumerate(boxes(i / 25))]) for i in range(30)
+    )
+    mind = reason(frames)[-1].mind
+    task = TaskBelief("t", Verdict.IN_PROGRESS, bindings=(Binding("hand", ("hand",), 1),))
+    return replace(mind, tasks=(task,))
+
+
+@pytest.mark.parametrize(
+    ("hand_speed", "link_speed", "gap", "near"),
+    [
+        (60.0, 60.0, 20.0, {1, 2, 3}),  # from neighbour to neighbour
+        (60.0, 40.0, 20.0, {1, 2, 3}),  # links are slower than the hand
+        (60.0, 60.0, 90.0, {1}),  # too far away
+        (0.0, 60.0, 20.0, set()),  # the actor rests
+        (15.0, 60.0, 20.0, {1}),  # who passes by an actor is much faster
+    ],
+)
+def test_what_is_near_an_actor_at_work_and_as_slow_may_be_a_part_of_its_machine(
+    hand_speed: float, link_speed: float, gap: float, near: set[int]
+) -> None:
+    mind = links(hand_speed, link_speed, gap)
+    assert ids_of_yes(mind, near_moving_actor(Snapshot(mind))) == near

@@ -50,6 +50,11 @@ def test_what_bobs_within_the_range_keeps_it() -> None:
     assert finish(played.last.tasks[0]) is Verdict.SUCCEEDED
 
 
+def test_coming_nearer_within_a_range_is_expected() -> None:
+    (task,) = lived(lambda t: 60.0 + 15 * sin(2 * t), ALONE, 5.0).last.tasks
+    assert "converging" in {e.relation for e in task.expected}
+
+
 def test_a_range_begins_when_the_gap_comes_into_it() -> None:
     played = lived(lambda t: max(60.0, 180 - 30 * t))
     begun = next(e for e in played.events if e.data.get("stage") == "stay")
