@@ -25,7 +25,7 @@ from visup.archive.chunks.spans import ChunkSpan, Cutting, chunk_spans
 from visup.archive.chunks.stitching import stitched
 from visup.archive.filling.attempts import Attempts
 from visup.archive.filling.clips import Clip
-from visup.archive.filling.filling import FillResult, begin_anew, fill, only_filler
+from visup.archive.filling.filling import FillResult, clear_attempts, fill, only_filler
 from visup.archive.filling.plan import Plan, make_plan
 from visup.archive.filling.pool import Pool
 from visup.archive.filling.watching import watch_into
@@ -227,7 +227,7 @@ def test_chunks_that_are_watched_are_not_watched_again(tmp_path: Path) -> None:
 
     for _ in range(2):
         with only_filler(lake):
-            begin_anew(lake, retry=False)
+            clear_attempts(lake, retry=False)
             try:
                 filled(lake, some, watch)
             except Killed:

@@ -21,7 +21,7 @@ from tests.paths import ROOT
 from visup.agent.model.errors import OutputError, SettingsError, SourceError
 from visup.archive.filling.attempts import Attempts, forget_interrupted
 from visup.archive.filling.clips import Clip, clips_of
-from visup.archive.filling.filling import FillResult, begin_anew, fill, only_filler
+from visup.archive.filling.filling import FillResult, clear_attempts, fill, only_filler
 from visup.archive.filling.plan import Plan, make_plan
 from visup.archive.filling.pool import Pool, open_pool
 from visup.archive.filling.pool_settings import PoolSettings
@@ -100,11 +100,11 @@ def test_stopped_anywhere_it_goes_on_to_the_same_lake(tmp_path: Path) -> None:
     lake = Lake.create(tmp_path / "lake")
     for at in (0, 1, 1):
         with only_filler(lake):
-            begin_anew(lake, retry=False)
+            clear_attempts(lake, retry=False)
             with pytest.raises(Killed):
                 filled(lake, some, dying(at)[0])
     with only_filler(lake):
-        begin_anew(lake, retry=False)
+        clear_attempts(lake, retry=False)
         plan, result = filled(lake, some)
     assert (plan.present, result.added, result.failed) == (2, 1, [])
     assert rows(lake) == rows(whole)
@@ -119,10 +119,10 @@ def test_a_clip_that_ends_two_workers_is_put_aside(tmp_path: Path) -> None:
     outcome = watch_job(lake, job, dying(0)[0])
     assert outcome.failure is not None
     assert outcome.failure.put_aside
-    begin_anew(lake, retry=False)
+    clear_attempts(lake, retry=False)
     plan = make_plan(lake, clips(tmp_path / "clips", "1"), SETTINGS)
     assert (plan.jobs, [f.put_aside for f in plan.failed]) == ((), [True])
-    begin_anew(lake, retry=True)
+    clear_attempts(lake, retry=True)
     assert filled(lake, clips(tmp_path / "clips", "1"))[1].added == 1
 
 
@@ -175,7 +175,7 @@ def kill_starters(until: Event) -> None:
 @pytest.fixture
 def ten(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[Clip]:
     pytest.importorskip("distributed", reason="needs the extra `cluster`")
-    monkeypatch.setattr("visup.archive.filling.own_workers.LOOK_S", 0.1)
+    monkeypatch.setattr("visup.archive.filling.local_workers.POLL_S", 0.1)
     return clips(tmp_path / "clips", *map(str, range(1, 11)))
 
 
@@ -203,7 +203,7 @@ def test_workers_come_again_when_they_cannot_be_started_at_once(
         assert over.is_set()
     assert result.added + len(result.failed) == len(ten)
     assert all(f.put_aside for f in result.failed)
-    begin_anew(lake, retry=True)
+    clear_attempts(lake, retry=True)
     filled(lake, ten)
     filled(alone, ten)
     assert rows(lake) == rows(alone)
@@ -212,7 +212,7 @@ def test_workers_come_again_when_they_cannot_be_started_at_once(
 def test_workers_that_never_come_again_are_not_waited_for(
     tmp_path: Path, ten: list[Clip], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("visup.archive.filling.own_workers.MOST_RENEWALS", 1)
+    monkeypatch.setattr("visup.archive.filling.local_workers.MAX_RENEWALS", 1)
     lake, over = Lake.create(tmp_path / "lake"), Event()
     killer = Thread(target=kill_starters, args=(over,))
 
@@ -226,7 +226,7 @@ def test_workers_that_never_come_again_are_not_waited_for(
             fill(lake, plan, pool, kill, scripted)
         over.set()
         killer.join()
-    begin_anew(lake, retry=True)
+    clear_attempts(lake, retry=True)
     filled(lake, ten)
     assert len(lake.runs()) == len(ten)
 

@@ -22,11 +22,10 @@ from visup.agent.model.errors import ErrorGroup, RuleError, SettingsError, Sourc
 from visup.agent.model.step import Step
 from visup.agent.storage.journal_reader import Recording
 from visup.archive.adding import add_run
-from visup.archive.asking.database import LakeDatabase, QueryError, open_database
 from visup.archive.finding.beliefs import read_minds
 from visup.archive.finding.clips import cut_hits, spans
-from visup.archive.finding.judge import ConditionJudge, Hit
 from visup.archive.finding.pattern import desugared, read_pattern
+from visup.archive.finding.pattern_evaluator import Hit, PatternEvaluator
 from visup.archive.finding.search import (
     ConditionSearch,
     RulesSearch,
@@ -35,6 +34,7 @@ from visup.archive.finding.search import (
 )
 from visup.archive.lake import BELIEFS, Lake
 from visup.archive.parallel import each_run
+from visup.archive.querying.database import LakeDatabase, QueryError, open_database
 from visup.evaluation.archive.conditions import random_conditions
 from visup.percepts.video.open import open_source
 from visup.rules.language.parser import load_rules
@@ -80,9 +80,9 @@ def test_what_is_found_is_what_the_agent_says(
     possible = [set(search.possible_runs(database)) for search in searches]
     for run in lake.runs():
         recording, settings = lake.recorded(run)
-        judges = [ConditionJudge(s.pattern) for s in searches]
+        judges = [PatternEvaluator(s.pattern) for s in searches]
 
-        def look(step: Step, judges: list[ConditionJudge] = judges) -> None:
+        def look(step: Step, judges: list[PatternEvaluator] = judges) -> None:
             nonlocal compared
             for n, judge in enumerate(judges):
                 judge(step)
@@ -247,7 +247,7 @@ def test_a_sequence_is_true_once_it_is_complete(tmp_path: Path) -> None:
     first, then = "converging(arm, spartan)", "diverging(arm, spartan)"
     truths: list[tuple[float, bool, bool, bool]] = []
     judges = [
-        ConditionJudge(read_pattern(t))
+        PatternEvaluator(read_pattern(t))
         for t in (first, then, f"{first} and then {then} within 1 s")
     ]
 

@@ -18,14 +18,14 @@ from tests.cli import Call, caller
 from visup.agent.model.errors import OutputError
 from visup.agent.storage.atomic import replacing
 from visup.agent.storage.journal_reader import Recording
-from visup.archive.asking.database import open_database
-from visup.archive.asking.views import RELATIONS, VIEWS
 from visup.archive.finding.search import read_search
 from visup.archive.inputs import run_inputs
 from visup.archive.joining import compacting
 from visup.archive.joining.compacting import compact
 from visup.archive.joining.manifest import FOLDER, MANIFEST, read_manifest
 from visup.archive.lake import Lake
+from visup.archive.querying.database import open_database
+from visup.archive.querying.views import RELATIONS, VIEWS
 from visup.archive.run_tables import Provenance, RunTables, run_tables
 from visup.archive.schema import TABLES
 from visup.runs.resume import recorded_settings

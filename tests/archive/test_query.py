@@ -14,14 +14,14 @@ import pytest
 from tests.archive.watches import clips, scripted
 from tests.cli import Call, caller
 from tests.paths import ROOT
-from visup.archive.asking.answers import answer_rows
-from visup.archive.asking.database import LakeDatabase, QueryError, open_database
-from visup.archive.asking.examples import EXAMPLES
-from visup.archive.asking.views import RELATIONS, VIEWS
 from visup.archive.filling.filling import fill
 from visup.archive.filling.plan import make_plan
 from visup.archive.filling.pool import Pool
 from visup.archive.lake import Lake
+from visup.archive.querying.answers import answer_rows
+from visup.archive.querying.database import LakeDatabase, QueryError, open_database
+from visup.archive.querying.examples import EXAMPLES
+from visup.archive.querying.views import RELATIONS, VIEWS
 from visup.runs.settings import WatchSettings
 
 pytest.importorskip("duckdb", reason="needs the extra `cluster`")

@@ -15,8 +15,8 @@ import pytest
 from tests.archive.recordings import meeting, record
 from tests.cli import Call, caller
 from visup.archive.adding import add_run
-from visup.archive.asking.database import LakeDatabase, open_database
 from visup.archive.lake import Lake
+from visup.archive.querying.database import LakeDatabase, open_database
 from visup.archive.reporting.figures import all_figures
 from visup.archive.reporting.page import lake_page
 from visup.archive.reporting.statistics import LakeStatistics, drifts, lake_statistics

@@ -16,12 +16,12 @@ from tests.archive.watches import clips, scripted
 from tests.cli import Call, caller
 from visup.agent.model.errors import OutputError
 from visup.archive.adding import add_run
-from visup.archive.asking.database import open_database
 from visup.archive.filling.filling import fill
 from visup.archive.filling.plan import make_plan
 from visup.archive.filling.pool import Pool
 from visup.archive.joining.compacting import compact
 from visup.archive.lake import Lake
+from visup.archive.querying.database import open_database
 from visup.archive.storing import lake_store
 from visup.archive.storing.lake_store import LakeStore
 from visup.archive.storing.places import create_lake, open_lake, pushed, store_of

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from visup.agent import Relation, RelationTable, Truth
 from visup.agent.model.relation_columns import Column, ColumnLayout, RelationBlock
 from visup.archive.relation_intervals import RelationIntervals
-from visup.archive.stretches import StepTime, Stretches
+from visup.archive.value_intervals import IntervalCollector, StepTime
 
 values = st.lists(st.dictionaries(st.sampled_from("ab"), st.integers(0, 2)), max_size=12)
 
@@ -22,7 +22,7 @@ def times(count: int) -> list[StepTime]:
 
 @given(values)
 def test_stretches_tell_each_value_of_each_step(steps: list[dict[str, int]]) -> None:
-    stretches: Stretches[str, int] = Stretches()
+    stretches: IntervalCollector[str, int] = IntervalCollector()
     at = times(len(steps))
     for when, held in zip(at, steps, strict=True):
         stretches.add(when, held)

@@ -2,6 +2,6 @@
 
 Read `schema.py` (what the tables hold), `run_tables.py` (from a journal to rows), then `lake.py` (rows on
 disk, one run at a time, atomically), `identity.py` (keys of runs), `filling/` (many clips on
-many workers), `asking/` (SQL) and `finding/` (conditions). Needs the extra `visup[cluster]`, which is
+many workers), `querying/` (SQL) and `finding/` (conditions). Needs the extra `visup[cluster]`, which is
 imported only when it is used.
 """

@@ -8,7 +8,7 @@ from itertools import chain
 from pathlib import Path
 
 from visup.agent.storage.journal_reader import Recording, event_text
-from visup.archive.finding.beliefs import BeliefNotes
+from visup.archive.finding.beliefs import BeliefRecorder
 from visup.archive.identity import run_key, settings_hash
 from visup.archive.inputs import run_inputs
 from visup.archive.lake import Lake
@@ -42,7 +42,7 @@ def add_run(lake: Lake, run: Path, labels: Mapping[str, str] | None = None) -> t
         return key, False
     taken = source.stat().st_mtime if source.exists() else None
     provenance = Provenance(key, recorded, by, taken, labels or {})
-    notes = BeliefNotes()
+    notes = BeliefRecorder()
     tables = run_tables(recording, settings, provenance, notes)
     return key, lake.commit(tables, recording, run_inputs(settings), notes.content())
 

@@ -172,7 +172,7 @@ class Lake:
             tables: Its rows, from `run_tables`.
             recording: Its journal.
             inputs: Its input files.
-            beliefs: Content of `BeliefNotes`, or empty.
+            beliefs: Content of `BeliefRecorder`, or empty.
 
         Returns:
             Whether it was added; False if the lake has it already.

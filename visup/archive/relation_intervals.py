@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from visup.agent import Relation, RelationTable, Truth
 from visup.agent.model.relation_columns import UNKNOWN_CODE, ColumnLayout, RelationBlock
-from visup.archive.stretches import StepTime, Stretches, stretch_columns
+from visup.archive.value_intervals import IntervalCollector, StepTime, interval_columns
 
 Floats = NDArray[np.float64]
 Pair = tuple[int, int]
@@ -79,7 +79,9 @@ class RelationIntervals:
     def __init__(self) -> None:
         self._times: list[StepTime] = []
         self._open: dict[int, tuple[_LayoutRows, _OpenPairs]] = {}
-        self._plugin_stretches: Stretches[tuple[str, Pair], tuple[str, float]] = Stretches()
+        self._plugin_stretches: IntervalCollector[tuple[str, Pair], tuple[str, float]] = (
+            IntervalCollector()
+        )
         self._rows: list[Row] = []
 
     def add(self, at: StepTime, relations: RelationTable | tuple[Relation, ...]) -> None:
@@ -94,8 +96,8 @@ class RelationIntervals:
         pairs = tuple(combinations(table.ids, 2))
         blocks = {id(part.columns): part for part in table.parts}
         for key in [k for k in self._open if k not in blocks]:
-            layout, held = self._open.pop(key)
-            self._close(layout, held, np.ones(held.state.shape, bool), at, False)
+            layout, open_pairs = self._open.pop(key)
+            self._close(layout, open_pairs, np.ones(open_pairs.state.shape, bool), at, False)
         for key, block in blocks.items():
             before = self._open.get(key)
             layout = before[0] if before else _LayoutRows(block.columns)
@@ -116,7 +118,7 @@ class RelationIntervals:
     def _next(
         self,
         layout: _LayoutRows,
-        held: _OpenPairs | None,
+        open_pairs: _OpenPairs | None,
         block: RelationBlock,
         pairs: tuple[Pair, ...],
     ) -> _OpenPairs:
@@ -126,58 +128,58 @@ class RelationIntervals:
         new = _OpenPairs(
             pairs, state, np.full(state.shape, number, np.int64), confidence, value, value
         )
-        if held is None:
+        if open_pairs is None:
             return new
-        if held.pairs != pairs:
-            held, existed = self._realigned(layout, held, pairs)
+        if open_pairs.pairs != pairs:
+            open_pairs, existed = self._realigned(layout, open_pairs, pairs)
         else:
             existed = np.ones(len(pairs), bool)
-        same = (held.state == state) & existed
-        self._close(layout, held, ~same & existed, self._times[-1], False)
+        same = (open_pairs.state == state) & existed
+        self._close(layout, open_pairs, ~same & existed, self._times[-1], False)
         return _OpenPairs(
             pairs,
             state,
-            np.where(same, held.begin, new.begin),
-            np.where(same, np.minimum(held.confidence, confidence), confidence),
-            np.where(same, np.fmin(held.least, value), value),
-            np.where(same, np.fmax(held.most, value), value),
+            np.where(same, open_pairs.begin, new.begin),
+            np.where(same, np.minimum(open_pairs.confidence, confidence), confidence),
+            np.where(same, np.fmin(open_pairs.least, value), value),
+            np.where(same, np.fmax(open_pairs.most, value), value),
         )
 
     def _realigned(
-        self, layout: _LayoutRows, held: _OpenPairs, pairs: tuple[Pair, ...]
+        self, layout: _LayoutRows, open_pairs: _OpenPairs, pairs: tuple[Pair, ...]
     ) -> tuple[_OpenPairs, NDArray[np.bool_]]:
         """Realign to other pairs; returns which existed before. Those of missing pairs are closed."""
-        place = {pair: k for k, pair in enumerate(held.pairs)}
+        place = {pair: k for k, pair in enumerate(open_pairs.pairs)}
         current = set(pairs)
-        missing = np.array([p not in current for p in held.pairs], bool)
-        ended = np.broadcast_to(missing, held.state.shape)
-        self._close(layout, held, ended, self._times[-1], False)
+        missing = np.array([p not in current for p in open_pairs.pairs], bool)
+        ended = np.broadcast_to(missing, open_pairs.state.shape)
+        self._close(layout, open_pairs, ended, self._times[-1], False)
         existed = np.array([p in place for p in pairs], bool)
-        if not held.pairs:  # no previous pairs to realign
+        if not open_pairs.pairs:  # no previous pairs to realign
             rows = len(layout.rows)
             zeros = np.zeros((rows, len(pairs)))
             none = zeros.astype(np.int64)
             return _OpenPairs(pairs, none.astype(np.int8), none, zeros, zeros, zeros), existed
-        return held.take([place.get(p, 0) for p in pairs], pairs), existed
+        return open_pairs.take([place.get(p, 0) for p in pairs], pairs), existed
 
     def _close(
         self,
         layout: _LayoutRows,
-        held: _OpenPairs,
+        open_pairs: _OpenPairs,
         ended: NDArray[np.bool_],
         at: StepTime,
         open_end: bool,
     ) -> None:
         for line, k in zip(*(n.tolist() for n in np.nonzero(ended)), strict=True):
             _, turned, names, _, _ = layout.rows[line]
-            pair = held.pairs[k][::-1] if turned else held.pairs[k]
-            stretch = stretch_columns(self._times[int(held.begin[line, k])], at, open_end)
+            pair = open_pairs.pairs[k][::-1] if turned else open_pairs.pairs[k]
+            stretch = interval_columns(self._times[int(open_pairs.begin[line, k])], at, open_end)
             numbers = (
-                round(float(held.confidence[line, k]), 6),
-                _number(held.least[line, k]),
-                _number(held.most[line, k]),
+                round(float(open_pairs.confidence[line, k]), 6),
+                _number(open_pairs.least[line, k]),
+                _number(open_pairs.most[line, k]),
             )
-            for name, truth in _names_of_state(names, int(held.state[line, k])):
+            for name, truth in _names_of_state(names, int(open_pairs.state[line, k])):
                 self._rows.append((name, *pair, truth, *stretch, *numbers))
 
 

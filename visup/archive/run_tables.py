@@ -18,7 +18,7 @@ from visup.agent.storage.journal_reader import Recording
 from visup.agent.storage.jsonable import to_jsonable
 from visup.archive.relation_intervals import RelationIntervals
 from visup.archive.schema import TABLES
-from visup.archive.stretches import StepTime, Stretches
+from visup.archive.value_intervals import IntervalCollector, StepTime
 from visup.runs.replay import replay
 from visup.runs.settings import WatchSettings
 
@@ -78,12 +78,12 @@ def run_tables(
         )
     steps = StepTables()
 
-    def tell(step: Step) -> None:
+    def on_step(step: Step) -> None:
         steps.add(step)
         if also:
             also(step)
 
-    replay(recording, settings, on_step=tell)
+    replay(recording, settings, on_step=on_step)
     tables = {
         "runs": [_run_row(facts, settings, steps, given)],
         "events": list(_event_rows(recording.events())),
@@ -134,9 +134,9 @@ class StepTables:
         self.last: StepTime | None = None
         self.size: tuple[int, int] = (0, 0)
         self._relations = RelationIntervals()
-        self._tasks: Stretches[str, tuple[Any, ...]] = Stretches()
-        self._stages: Stretches[tuple[str, str], tuple[Any, ...]] = Stretches()
-        self._health: Stretches[str, str] = Stretches()
+        self._tasks: IntervalCollector[str, tuple[Any, ...]] = IntervalCollector()
+        self._stages: IntervalCollector[tuple[str, str], tuple[Any, ...]] = IntervalCollector()
+        self._health: IntervalCollector[str, str] = IntervalCollector()
         self._objects: dict[int, _ObjectRecord] = {}
         self._percepts: dict[tuple[str, str, float], list[float]] = {}
 

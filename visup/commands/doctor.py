@@ -111,10 +111,10 @@ def examine() -> Iterator[CheckedPart]:
         yield _library(name, purpose)
     for extra, (purpose, names) in EXTRAS.items():
         yield _extra(extra, purpose, names)
-    yield _tried("video codecs", _codecs)
-    yield _tried("behaviours", _behaviours)
-    yield _tried("shipped tasks", _tasks)
-    yield _tried("demo clip", _demo)
+    yield _checked_part("video codecs", _codecs)
+    yield _checked_part("behaviours", _behaviours)
+    yield _checked_part("shipped tasks", _tasks)
+    yield _checked_part("demo clip", _demo)
 
 
 SPEED_FRAMES = 60
@@ -171,10 +171,10 @@ def _version(name: str) -> str | None:
         return None
 
 
-def _tried(what: str, look: Callable[[], str]) -> CheckedPart:
+def _checked_part(what: str, check: Callable[[], str]) -> CheckedPart:
     """The result of one check; any exception is a finding, since finding faults is the purpose."""
     try:
-        return CheckedPart(what, "ok", look())
+        return CheckedPart(what, "ok", check())
     except Exception as fault:
         return CheckedPart(what, "broken", f"{type(fault).__name__}: {fault}")
 

@@ -74,13 +74,13 @@ def replay(
     with ExitStack() as stack:
         report = stack.enter_context(ReplayReport(recording, settings)) if folder else None
 
-        def tell(step: Step) -> None:
+        def on_step(step: Step) -> None:
             if not silent:
                 narrator(step)
             if report:
                 report(step)
 
-        transcript = reason_again(recording, settings, folder, tell)
+        transcript = reason_again(recording, settings, folder, on_step)
         if not silent:
             narrator.finish()
         console.print(_speed(transcript), style="dim")

@@ -9,8 +9,8 @@ import pytest
 from tests.archive.recordings import meeting, record
 from visup.agent.model.errors import SettingsError
 from visup.archive.adding import add_run
-from visup.archive.asking.database import open_database
 from visup.archive.lake import Lake
+from visup.archive.querying.database import open_database
 from visup.evaluation.archive.exactness import compare_find
 from visup.evaluation.archive.large_lake import QUESTIONS
 from visup.evaluation.archive.multiplied import lend_recordings, multiply

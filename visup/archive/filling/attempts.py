@@ -12,7 +12,7 @@ from pathlib import Path
 
 from visup.agent.model.errors import OutputError
 
-MOST = 2
+MAX_ATTEMPTS = 2
 """A clip that has crashed this many workers is put aside."""
 FOLDER = "attempts"
 
@@ -32,7 +32,7 @@ class Attempts:
     @property
     def exhausted(self) -> bool:
         """Whether it is given up."""
-        return all(mark.exists() for mark in self._marks())
+        return all(mark.exists() for mark in self._mark_files())
 
     def begin(self) -> bool:
         """Leave a mark; False if the limit is reached.
@@ -40,7 +40,7 @@ class Attempts:
         Raises:
             OutputError: It cannot be written.
         """
-        for mark in self._marks():
+        for mark in self._mark_files():
             try:
                 mark.parent.mkdir(parents=True, exist_ok=True)
                 mark.touch(exist_ok=False)
@@ -63,22 +63,22 @@ class Attempts:
 
     def clear(self) -> None:
         """Remove all marks, after a worker finished or to try again."""
-        for mark in self._marks():
+        for mark in self._mark_files():
             mark.unlink(missing_ok=True)
 
-    def _marks(self) -> list[Path]:
-        return [self.lake / FOLDER / f"{self.run}.{n}" for n in range(1, MOST + 1)]
+    def _mark_files(self) -> list[Path]:
+        return [self.lake / FOLDER / f"{self.run}.{n}" for n in range(1, MAX_ATTEMPTS + 1)]
 
 
-def forget_interrupted(lake: Path, *, also_put_aside: bool = False) -> None:
+def forget_interrupted(lake: Path, *, include_failed: bool = False) -> None:
     """Remove the marks of clips that were merely in progress when filling was stopped.
 
     Args:
         lake: Folder of the lake; no other process is filling it.
-        also_put_aside: Whether to remove those of clips put aside, too.
+        include_failed: Whether to remove those of clips put aside, too.
     """
     marks = sorted((lake / FOLDER).glob("*.*"))
     for run in {mark.stem for mark in marks}:
         attempts = Attempts(lake, run)
-        if also_put_aside or not attempts.exhausted:
+        if include_failed or not attempts.exhausted:
             attempts.clear()

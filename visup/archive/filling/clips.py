@@ -21,10 +21,10 @@ from visup.runs.settings import parse_actors
 
 PARQUET = ".parquet"
 MANIFESTS = (".csv", PARQUET)
-LARGEST_MANIFEST_BYTES = 128 * 2**20
+MAX_MANIFEST_BYTES = 128 * 2**20
 SEQUENCE_FOLDERS = ("img1", "frames")
 """A folder with one of these is a sequence of images in the layout of MOT or DAVIS."""
-_OWN = ("source", "task", "actor", "taken")
+_RESERVED_COLUMNS = ("source", "task", "actor", "taken")
 Row = Mapping[str | None, str | None]
 
 
@@ -123,7 +123,7 @@ def _manifest(path: Path) -> Iterator[Clip]:
 def _csv_rows(path: Path) -> Iterator[tuple[int, Row]]:
     """The rows of a manifest with their line numbers; the header is checked even without rows."""
     try:
-        reader = csv.DictReader(StringIO(read_text_file(path, LARGEST_MANIFEST_BYTES)), strict=True)
+        reader = csv.DictReader(StringIO(read_text_file(path, MAX_MANIFEST_BYTES)), strict=True)
         if "source" not in (reader.fieldnames or ()):
             yield 1, {}
         yield from ((reader.line_num, row) for row in reader)
@@ -160,7 +160,7 @@ def _clip(row: Row, manifest: Path, line: int) -> Clip:
         raise SourceError("the line has more fields than the head", where=where)
     source = _source(fields["source"], manifest.absolute().parent, where)
     tasks = tuple(_task(t, manifest) for t in _parts(fields.get("task", "")))
-    labels = {k: v for k, v in fields.items() if k not in _OWN and v}
+    labels = {k: v for k, v in fields.items() if k not in _RESERVED_COLUMNS and v}
     actors = parse_actors(_parts(fields.get("actor", "")))
     return Clip(source, tasks, actors, _taken(fields.get("taken", ""), where), labels)
 

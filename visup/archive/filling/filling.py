@@ -12,7 +12,7 @@ from pathlib import Path
 from visup.agent.storage.atomic import write_atomically
 from visup.agent.storage.file_lock import acquire_lock
 from visup.archive.filling.attempts import forget_interrupted
-from visup.archive.filling.pieces import CHUNKS
+from visup.archive.filling.piece_queue import CHUNKS
 from visup.archive.filling.plan import FailedClip, Plan
 from visup.archive.filling.pool import Pool
 from visup.archive.filling.watching import WORK, ClipOutcome, Watch, watch_into
@@ -53,7 +53,7 @@ class FillResult:
     video_s: float = 0.0
     work_s: float = 0.0
 
-    def take(self, outcome: ClipOutcome) -> None:
+    def record(self, outcome: ClipOutcome) -> None:
         """Count one clip."""
         if outcome.failure:
             self.failed.append(outcome.failure)
@@ -67,7 +67,7 @@ def fill(
     lake: Lake,
     plan: Plan,
     pool: Pool,
-    tell: Callable[[ClipOutcome], None],
+    on_outcome: Callable[[ClipOutcome], None],
     watch: Watch = watch_into,
 ) -> FillResult:
     """Carry out a plan; the caller holds `only_filler` and has removed old marks.
@@ -76,7 +76,7 @@ def fill(
         lake: The lake.
         plan: The missing runs.
         pool: The workers.
-        tell: Receives the outcome of each clip.
+        on_outcome: Receives the outcome of each clip.
         watch: Records a clip.
     """
     result = FillResult(failed=list(plan.failed))
@@ -84,10 +84,10 @@ def fill(
     rate = read_rate(lake.path)
     try:
         for outcome in pool.outcomes(lake, plan.jobs, watch):
-            result.take(outcome)
+            result.record(outcome)
             if not outcome.failure:
                 rate = rate[0] + sizes[outcome.run], rate[1] + outcome.wall_s
-            tell(outcome)
+            on_outcome(outcome)
         shutil.rmtree(lake.path / CHUNKS, ignore_errors=True)  # left by clips that failed
     finally:
         with suppress(OSError):  # used for estimates only
@@ -96,16 +96,16 @@ def fill(
     return result
 
 
-def begin_anew(lake: Lake, *, retry: bool) -> None:
+def clear_attempts(lake: Lake, *, retry: bool) -> None:
     """Remove the marks of clips in progress when filling stopped; with `retry` also of those put aside."""
-    forget_interrupted(lake.path, also_put_aside=retry)
+    forget_interrupted(lake.path, include_failed=retry)
 
 
 def read_rate(lake: Path) -> tuple[int, float]:
     """Bytes processed so far, and seconds of work for them; (0, 0.0) at first."""
     try:
-        told = json.loads((lake / RATE).read_text(encoding="utf-8"))
-        return int(told["bytes"]), float(told["seconds"])
+        rate = json.loads((lake / RATE).read_text(encoding="utf-8"))
+        return int(rate["bytes"]), float(rate["seconds"])
     except (OSError, ValueError, KeyError, TypeError):
         return 0, 0.0
 

@@ -19,17 +19,17 @@ from visup.agent.execution.runners import error_line
 from visup.agent.model.errors import SettingsError
 from visup.archive.extra import imported
 from visup.archive.filling.attempts import Attempts
-from visup.archive.filling.own_workers import OwnWorkers, own_workers
-from visup.archive.filling.pieces import ClipPiece, PieceBook, given_up, watch_piece
+from visup.archive.filling.local_workers import LocalWorkers, local_workers
+from visup.archive.filling.piece_queue import ClipPiece, PieceQueue, crashed_outcome, watch_piece
 from visup.archive.filling.plan import FailedClip, Job
 from visup.archive.filling.pool_settings import PoolSettings
 from visup.archive.filling.watching import ClipOutcome, Watch, watch_into
 from visup.archive.lake import Lake
 
-WAITING_PER_WORKER = 3
+QUEUED_PER_WORKER = 3
 """Jobs submitted per worker, so that the next is ready when one ends."""
 CONNECT_S = 20
-MOST_RESUBMISSIONS = 5
+MAX_RESUBMISSIONS = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ class Pool:
 
     client: Any = None
     dashboard: str | None = None
-    own: OwnWorkers | None = None
+    own: LocalWorkers | None = None
 
     def outcomes(
         self, lake: Lake, jobs: Sequence[Job], watch: Watch = watch_into
@@ -72,7 +72,7 @@ def open_pool(settings: PoolSettings) -> Iterator[Pool]:
             yield Pool(client, client.dashboard_link)
         return
     has_dashboard = find_spec("bokeh") is not None
-    with own_workers(settings) as own, distributed.Client(own.cluster) as client:
+    with local_workers(settings) as own, distributed.Client(own.cluster) as client:
         yield Pool(client, own.cluster.dashboard_link if has_dashboard else None, own)
 
 
@@ -88,7 +88,7 @@ def _connected(distributed: Any, address: str) -> Any:
 
 
 def _in_process(lake: Lake, jobs: Sequence[Job], watch: Watch) -> Iterator[ClipOutcome]:
-    book = PieceBook(jobs)
+    book = PieceQueue(jobs)
     while piece := book.next():
         if outcome := book.done(piece, watch_piece(lake, piece, watch)):
             yield outcome
@@ -103,7 +103,7 @@ def _on_worker(lake: Lake, piece: ClipPiece, watch: Watch) -> ClipOutcome:
 def _on_dask(pool: Pool, lake: Lake, jobs: Sequence[Job], watch: Watch) -> Iterator[ClipOutcome]:
     distributed, client = imported("distributed"), pool.client
     # The longest first, so that no worker is left with a long clip at the end (LPT scheduling).
-    book = PieceBook(sorted(jobs, key=lambda job: job.bytes, reverse=True))
+    book = PieceQueue(sorted(jobs, key=lambda job: job.bytes, reverse=True))
     running: dict[Any, tuple[ClipPiece, int]] = {}
     completed = distributed.as_completed(raise_errors=False)
 
@@ -121,13 +121,13 @@ def _on_dask(pool: Pool, lake: Lake, jobs: Sequence[Job], watch: Watch) -> Itera
         running[future] = piece, resubmissions
         completed.add(future)
 
-    for _ in range(max(1, len(client.ncores())) * WAITING_PER_WORKER):
+    for _ in range(max(1, len(client.ncores())) * QUEUED_PER_WORKER):
         submit(book.next())
 
-    def take_back() -> None:
+    def resubmit() -> None:
         client.cancel(list(running), force=True)
 
-    with pool.own.kept(client, take_back) if pool.own else nullcontext():
+    with pool.own.supervised(client, resubmit) if pool.own else nullcontext():
         for future in completed:
             piece, resubmissions = running[future]
             outcome = _outcome(lake, piece, future, resubmissions)
@@ -149,13 +149,13 @@ def _outcome(lake: Lake, piece: ClipPiece, future: Any, resubmissions: int) -> C
             found: ClipOutcome = future.result()
             return found
     if Attempts(lake.path, piece.key).exhausted:
-        return given_up(lake, piece)
+        return crashed_outcome(lake, piece)
     if future.status == "cancelled":
         raise SettingsError(
             "all workers were lost, or the scheduler",
             hint="run the same command again: what is in the lake is kept, and the rest is done",
         )
-    if resubmissions >= MOST_RESUBMISSIONS:
+    if resubmissions >= MAX_RESUBMISSIONS:
         why = f" ({error_line(future.exception())})" if future.status == "error" else ""
         reason = f"its workers were lost {resubmissions} times{why}"
         return ClipOutcome(run, source, failure=FailedClip(source, reason))

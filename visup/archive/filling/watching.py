@@ -16,7 +16,7 @@ from visup.archive.chunks.extending import chunk_options
 from visup.archive.filling.attempts import Attempts
 from visup.archive.filling.plan import FailedClip, Job, put_aside
 from visup.archive.filling.stores import fetched, note_source
-from visup.archive.finding.beliefs import BeliefNotes
+from visup.archive.finding.beliefs import BeliefRecorder
 from visup.archive.inputs import run_inputs
 from visup.archive.lake import Lake
 from visup.archive.run_tables import run_tables
@@ -113,7 +113,7 @@ def _committed(lake: Lake, job: Job, folder: Path) -> tuple[str | None, float]:
     """Commit a recorded run; returns its verdict and its seconds of video."""
     recording = Recording.open(folder)
     settings = recorded_settings(recording.facts(), str(recording.path))
-    notes = BeliefNotes()
+    notes = BeliefRecorder()
     tables = run_tables(recording, settings, job.provenance, notes)
     lake.commit(tables, recording, run_inputs(settings), notes.content())
     row = dict(zip(TABLES["runs"].names, tables["runs"][0], strict=True))

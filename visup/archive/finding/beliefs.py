@@ -24,7 +24,7 @@ from visup.agent.model.object_beliefs import UNKNOWN_OBJECT, Candidate
 from visup.agent.model.relation_columns import RelationBlock
 from visup.agent.model.step import Step
 from visup.agent.model.task_beliefs import Binding
-from visup.archive.finding.judge import as_rules_see
+from visup.archive.finding.pattern_evaluator import before_tasks
 from visup.archive.lake import BELIEFS
 from visup.rules.relations.reasoner import COLUMNS, NAMES
 from visup.rules.safety.compiled_rules import compile_rules
@@ -33,26 +33,26 @@ from visup.version import __version__
 
 FORMAT = 1
 STATES = 1 + max(row for column in COLUMNS.each for row in column.rows)
-SURE = tuple(sorted({column.confidence for column in COLUMNS.each}))
+CONFIDENCE_ROWS = tuple(sorted({column.confidence for column in COLUMNS.each}))
 """Rows of the numbers that are confidences; the others are not needed."""
 NUMBERS = 1 + max(
     max(c.confidence, -1 if c.value is None else c.value, -1 if c.sigma is None else c.sigma)
     for c in COLUMNS.each
 )
-NOWHERE = cast("Region", None)
+NO_REGION = cast("Region", None)
 """Region of an object: not saved, and not used by relations."""
 Cast = Mapping[str, Any]
 """The objects, names and roles of a step as JSON; saved when they change."""
 
 
-def told_by_relations(pattern: Expression) -> bool:
+def depends_only_on_relations(pattern: Expression) -> bool:
     """Whether a condition depends only on relations between objects."""
     prepared = compile_rules((pattern.rule,))
     return not prepared.facts and not prepared.quantities and set(prepared.relations) <= set(NAMES)
 
 
 @dataclass(slots=True)
-class BeliefNotes:
+class BeliefRecorder:
     """Collects the beliefs of a run step by step."""
 
     times: list[float] = field(default_factory=list)
@@ -64,7 +64,7 @@ class BeliefNotes:
 
     def __call__(self, step: Step) -> None:
         """Add one step."""
-        mind = as_rules_see(step.mind)
+        mind = before_tasks(step.mind)
         table = mind.relations
         if not isinstance(table, RelationTable):
             table = RelationTable(extra=table)
@@ -77,13 +77,13 @@ class BeliefNotes:
         self.frames.append(step.frame_index)
         for block in blocks:
             self.states.append(block.state[:STATES].ravel())
-            self.sure.append(block.numbers[list(SURE)].ravel())
+            self.sure.append(block.numbers[list(CONFIDENCE_ROWS)].ravel())
 
     def content(self) -> bytes:
         """The content of the file; empty if a plug-in's reasoner contributed relations."""
         if not self.whole:
             return b""
-        told = {"format": FORMAT, "visup": __version__, "casts": self.casts}
+        header = {"format": FORMAT, "visup": __version__, "casts": self.casts}
         out = BytesIO()
         np.savez_compressed(
             out,
@@ -91,7 +91,7 @@ class BeliefNotes:
             frames=np.array(self.frames, np.int64),
             states=np.concatenate([*self.states, np.empty(0, np.int8)]),
             sure=np.concatenate([*self.sure, np.empty(0)]),
-            told=np.frombuffer(json.dumps(told).encode(), np.uint8),
+            told=np.frombuffer(json.dumps(header).encode(), np.uint8),
         )
         return out.getvalue()
 
@@ -101,11 +101,11 @@ def read_minds(folder: Path) -> list[Mind] | None:
     try:
         # Read into memory first: NumPy would leave a damaged file open.
         with np.load(BytesIO((folder / BELIEFS).read_bytes()), allow_pickle=False) as kept:
-            told = json.loads(kept["told"].tobytes())
-            if (told["format"], told["visup"]) != (FORMAT, __version__):
+            header = json.loads(kept["told"].tobytes())
+            if (header["format"], header["visup"]) != (FORMAT, __version__):
                 return None
             return list(
-                _minds(told["casts"], *(kept[k] for k in ("times", "frames", "states", "sure")))
+                _minds(header["casts"], *(kept[k] for k in ("times", "frames", "states", "sure")))
             )
     except (OSError, ValueError, KeyError, IndexError, TypeError, zipfile.BadZipFile):
         return None
@@ -146,11 +146,15 @@ def _minds(
             pairs = -1 if related is None else len(ids) * (len(ids) - 1) // 2
         table = RelationTable(ids)
         if pairs >= 0:
-            ends = at[0] + STATES * pairs, at[1] + len(SURE) * pairs
+            ends = at[0] + STATES * pairs, at[1] + len(CONFIDENCE_ROWS) * pairs
             state = states[at[0] : ends[0]].reshape(STATES, pairs)
             numbers = np.full((NUMBERS, pairs), np.nan)
-            numbers[list(SURE)] = sure[at[1] : ends[1]].reshape(len(SURE), pairs)
-            table = RelationTable(ids, (RelationBlock(COLUMNS, state, _never(pairs), numbers),))
+            numbers[list(CONFIDENCE_ROWS)] = sure[at[1] : ends[1]].reshape(
+                len(CONFIDENCE_ROWS), pairs
+            )
+            table = RelationTable(
+                ids, (RelationBlock(COLUMNS, state, _no_start_times(pairs), numbers),)
+            )
             at = list(ends)
         yield Mind(
             time=time,
@@ -164,24 +168,26 @@ def _minds(
 
 
 @lru_cache(maxsize=64)
-def _never(pairs: int) -> NDArray[np.float64]:
+def _no_start_times(pairs: int) -> NDArray[np.float64]:
     """Since when relations hold: not saved, and not used."""
     return np.zeros((STATES, pairs))
 
 
-def _mind_of(told: Cast) -> tuple[Mind, list[int] | None]:
+def _mind_of(cast_: Cast) -> tuple[Mind, list[int] | None]:
     """The mind of a step, and the objects between which relations are saved."""
-    played = tuple(Binding(actor, (), number) for actor, number in told["played"])
+    played = tuple(Binding(actor, (), number) for actor, number in cast_["played"])
     mind = Mind(
-        objects={int(number): _object(int(number), name) for number, name in told["names"].items()},
+        objects={
+            int(number): _object(int(number), name) for number, name in cast_["names"].items()
+        },
         tasks=(TaskBelief("", Verdict.UNKNOWN, bindings=played),) if played else (),
-        unknown=frozenset(told["unknown"]),
-        actors={actor: tuple(models) for actor, models in told["actors"].items()},
+        unknown=frozenset(cast_["unknown"]),
+        actors={actor: tuple(models) for actor, models in cast_["actors"].items()},
     )
-    return mind, told["related"]
+    return mind, cast_["related"]
 
 
 @lru_cache(maxsize=1024)
 def _object(number: int, name: str) -> ObjectBelief:
     known = () if name == UNKNOWN_OBJECT else (Candidate(name, 1.0, 1.0),)
-    return ObjectBelief(number, NOWHERE, Presence.SEEN, 0.0, 0.0, True, known)
+    return ObjectBelief(number, NO_REGION, Presence.SEEN, 0.0, 0.0, True, known)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from visup.agent.model.errors import SourceError
-from visup.archive.finding.judge import Hit
+from visup.archive.finding.pattern_evaluator import Hit
 from visup.percepts.video.open import open_source
 from visup.report.video import WebmWriter
 

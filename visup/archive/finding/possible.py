@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
 
-from visup.archive.asking.views import quoted
+from visup.archive.querying.views import quoted
 from visup.rules.formula.nodes import (
     And,
     Formula,
@@ -34,10 +34,10 @@ from visup.rules.monitoring.samples import SAMPLE_HOLD
 from visup.rules.predicates.snapshot import RELATION_NAMES
 from visup.rules.relations.reasoner import COLUMNS
 
-HELD_S = SAMPLE_HOLD / TICKS + 0.1
+MAX_GAP_S = SAMPLE_HOLD / TICKS + 0.1
 """Seconds by which intervals are widened: the hold time of a sample, and rounding."""
-EVER = 1e12
-HELD = (
+FOREVER = 1e12
+_HOLDING_SQL = (
     'held AS MATERIALIZED (SELECT number AS run, relation, a, b, "begin", "end" FROM lake_index.held'
     " WHERE relation IN ({names}){known})"
 )
@@ -54,7 +54,7 @@ class PossibleTimes:
     """Intervals in which a formula may be true, as a SELECT.
 
     Attributes:
-        sql: Yields `run`, the variables, `low` and `high` (seconds) from the rows of `HELD`.
+        sql: Yields `run`, the variables, `low` and `high` (seconds) from the rows of `_HOLDING_SQL`.
         variables: Its variables.
         relations: Its relations.
     """
@@ -63,7 +63,7 @@ class PossibleTimes:
     variables: tuple[str, ...]
     relations: tuple[str, ...]
 
-    def moved(self, low: float, high: float) -> PossibleTimes:
+    def shifted(self, low: float, high: float) -> PossibleTimes:
         """The times from `low` to `high` seconds after these."""
         names = "".join(f"{_name(v)}, " for v in self.variables)
         sql = f"SELECT run, {names}low + {low!r} AS low, high + {high!r} AS high FROM ({self.sql})"
@@ -77,7 +77,7 @@ class PossibleTimes:
             f"SELECT DISTINCT run, {names}low, high FROM ({self.sql})", retained, self.relations
         )
 
-    def meant(self, variable: str, who: str) -> PossibleTimes:
+    def for_name(self, variable: str, who: str) -> PossibleTimes:
         """The times restricted to some objects for a variable.
 
         Args:
@@ -109,36 +109,36 @@ def possible_times(formula: Formula) -> PossibleTimes | None:
             others = [v for v in inner.variables if v != variable] if inner else []
             return inner and inner.of(others)
         case Previous(part=part):
-            return _moved(part, 0.0, HELD_S)
+            return _shifted(part, 0.0, MAX_GAP_S)
         case Last(part=part, duration=duration):
-            return _moved(part, 0.0, duration.base)
+            return _shifted(part, 0.0, duration.base)
         case MOfN(part=part, of=of) if not formula.counts_samples and formula.least.value > 0:
-            return _moved(part, 0.0, of.base)
+            return _shifted(part, 0.0, of.base)
     return _windowed(formula)
 
 
 def _windowed(formula: Formula) -> PossibleTimes | None:
     match formula:
         case PastOperator(kind="once", part=part, window=window):
-            return _moved(part, *_span(window))
+            return _shifted(part, *_span(window))
         case PastOperator(kind="always", part=part, window=window) if _includes_now(window):
             return possible_times(part)
         case Since(right=right, window=window):
-            return _moved(right, *_span(window))
+            return _shifted(right, *_span(window))
         case FutureOperator(kind="eventually", part=part, window=TimeWindow(high=high)):
-            return _moved(part, 0.0, high.base)
+            return _shifted(part, 0.0, high.base)
         case Until(right=right, window=TimeWindow(high=high)):
-            return _moved(right, 0.0, high.base)
+            return _shifted(right, 0.0, high.base)
     return None
 
 
-def _moved(part: Formula, low: float, high: float) -> PossibleTimes | None:
+def _shifted(part: Formula, low: float, high: float) -> PossibleTimes | None:
     found = possible_times(part)
-    return found and found.moved(low, high)
+    return found and found.shifted(low, high)
 
 
 def _span(window: TimeWindow | None) -> tuple[float, float]:
-    return (0.0, EVER) if window is None else (window.low.base, window.high.base)
+    return (0.0, FOREVER) if window is None else (window.low.base, window.high.base)
 
 
 def _includes_now(window: TimeWindow | None) -> bool:
@@ -147,9 +147,9 @@ def _includes_now(window: TimeWindow | None) -> bool:
 
 
 def _relation(name: str, a: str, b: str) -> PossibleTimes:
-    low, high = f'"begin" - {HELD_S!r}', f'"end" + {HELD_S!r}'
+    low, high = f'"begin" - {MAX_GAP_S!r}', f'"end" + {MAX_GAP_S!r}'
     if name == "coupled":  # also evaluated for hidden objects, for which no relation is recorded
-        low, high = repr(-EVER), repr(EVER)
+        low, high = repr(-FOREVER), repr(FOREVER)
     rows = f"FROM held WHERE relation = {quoted(name)}"
     sql = f"SELECT run, a AS {_name(a)}, b AS {_name(b)}, {low} AS low, {high} AS high {rows}"
     if name in SYMMETRIC:

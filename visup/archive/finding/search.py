@@ -14,15 +14,15 @@ from visup.agent.model.did_you_mean import did_you_mean
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Step
 from visup.agent.storage.journal_reader import Recording
-from visup.archive.asking.database import LakeDatabase, QueryError
-from visup.archive.asking.views import quoted
-from visup.archive.finding.beliefs import read_minds, told_by_relations
-from visup.archive.finding.judge import ConditionJudge, Hit
+from visup.archive.finding.beliefs import depends_only_on_relations, read_minds
 from visup.archive.finding.pattern import read_pattern
-from visup.archive.finding.possible import HELD, PossibleTimes, possible_times
+from visup.archive.finding.pattern_evaluator import Hit, PatternEvaluator
+from visup.archive.finding.possible import _HOLDING_SQL, PossibleTimes, possible_times
 from visup.archive.finding.task_search import TaskSearch
 from visup.archive.lake import Lake
 from visup.archive.parallel import each_run
+from visup.archive.querying.database import LakeDatabase, QueryError
+from visup.archive.querying.views import quoted
 from visup.rules.formula.nodes import Rule
 from visup.rules.language.parser import load_rules
 from visup.rules.safety.expression import Expression
@@ -30,7 +30,7 @@ from visup.runs.replay import replay
 from visup.runs.settings import WatchSettings
 from visup.tasks import load_tasks
 
-MANY_QUICK = 200
+MIN_PARALLEL = 200
 """Fewer quick runs than this are done before worker processes would have started."""
 _BY_ID = re.compile(r"object_(\d+)")
 
@@ -85,12 +85,12 @@ class ConditionSearch:
     @property
     def quick(self) -> bool:
         """See `Search`."""
-        return told_by_relations(self.pattern)
+        return depends_only_on_relations(self.pattern)
 
     def possible_runs(self, database: LakeDatabase) -> list[str]:
         """See `Search`."""
         variables = self.pattern.rule.variables
-        who = {v: select for v in variables if (select := objects_meant(v)) is not None}
+        who = {v: select for v in variables if (select := objects_named(v)) is not None}
         for variable, select in who.items():
             if not database.ask(f"SELECT 1 FROM ({select}) LIMIT 1").num_rows:
                 raise _unknown_name(database, variable)
@@ -100,13 +100,13 @@ class ConditionSearch:
 
     def hits(self, recording: Recording, settings: WatchSettings) -> tuple[Hit, ...]:
         """See `Search`."""
-        judge = ConditionJudge(self.pattern)
+        evaluator = PatternEvaluator(self.pattern)
         minds = read_minds(recording.path.parent) if self.quick else None
         if minds is None:
-            replay(recording, settings, on_step=judge)
+            replay(recording, settings, on_step=evaluator)
         for mind in minds or ():
-            judge.judge(mind)
-        return tuple(h for h in judge.hits() if self.unknown or h.truth == Truth.TRUE)
+            evaluator.evaluate(mind)
+        return tuple(h for h in evaluator.hits() if self.unknown or h.truth == Truth.TRUE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,14 +132,14 @@ class RulesSearch:
         alerts: dict[int, tuple[Alert, tuple[str, ...]]] = {}
         last = 0.0
 
-        def look(step: Step) -> None:
+        def collect(step: Step) -> None:
             nonlocal last
             last = step.time
             for alert in step.alerts:
                 named = tuple(step.mind.objects[i].name for i in alert.objects)
                 alerts[alert.id] = alert, alerts.get(alert.id, (alert, named))[1]
 
-        replay(recording, replace(settings, rules=(self.file,)), on_step=look)
+        replay(recording, replace(settings, rules=(self.file,)), on_step=collect)
         kinds = {rule.name for rule in self.rules}
         return tuple(
             Hit(
@@ -194,12 +194,12 @@ def find(
         OutputError: A run is damaged.
     """
     keys = list(runs)
-    if workers is None and search.quick and len(keys) < MANY_QUICK:
+    if workers is None and search.quick and len(keys) < MIN_PARALLEL:
         workers = 0
-    yield from each_run(partial(_searched, lake, search), keys, workers)
+    yield from each_run(partial(_search_run, lake, search), keys, workers)
 
 
-def _searched(lake: Lake, search: Search, run: str) -> FoundRun:
+def _search_run(lake: Lake, search: Search, run: str) -> FoundRun:
     recording, settings = lake.recorded(run)
     hits = search.hits(recording, settings)
     return FoundRun(run, settings.source, lake.folder_of(run), hits)
@@ -219,9 +219,11 @@ def runs_of(
     parts = [f"{named[v]} AS MATERIALIZED ({select})" for v, select in who.items()]
     if times:
         known = "".join(f" AND number IN (SELECT run FROM {table})" for table in named.values())
-        parts.append(HELD.format(names=", ".join(map(quoted, times.relations)), known=known))
+        parts.append(
+            _HOLDING_SQL.format(names=", ".join(map(quoted, times.relations)), known=known)
+        )
     for variable, table in named.items():
-        times = times and times.meant(variable, f"FROM {table}")
+        times = times and times.for_name(variable, f"FROM {table}")
     sql = f"SELECT run FROM ({times.sql if times else 'SELECT number AS run FROM lake_index.runs'})"
     for table in named.values():
         sql = f"SELECT run FROM ({sql}) SEMI JOIN {table} USING (run)"
@@ -233,7 +235,7 @@ def runs_of(
     return found
 
 
-def objects_meant(variable: str) -> str | None:
+def objects_named(variable: str) -> str | None:
     """The objects that a name may have meant, as a SELECT; None for a variable."""
     if by_id := _BY_ID.fullmatch(variable):
         return (

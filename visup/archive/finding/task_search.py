@@ -8,8 +8,8 @@ from pathlib import Path
 from visup.agent import TaskBelief, Truth, Verdict
 from visup.agent.model.step import Step
 from visup.agent.storage.journal_reader import Recording
-from visup.archive.asking.database import LakeDatabase
-from visup.archive.finding.judge import Hit
+from visup.archive.finding.pattern_evaluator import Hit
+from visup.archive.querying.database import LakeDatabase
 from visup.runs.replay import changed_settings, replay
 from visup.runs.settings import WatchSettings
 

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from visup.agent.storage.atomic import replacing
-from visup.archive.asking.stage_times import stage_times
 from visup.archive.extra import imported
 from visup.archive.joining.manifest import Partition
+from visup.archive.querying.stage_times import stage_times
 from visup.archive.schema import TABLES
 
 if TYPE_CHECKING:
@@ -76,17 +76,17 @@ def write_partition(folder: Path, part: Partition, tables: Tables) -> None:
     found = {name: in_order(tables[name], part.runs) for name in TABLES}
     for name, rows in found.items():
         _write(folder / f"{name}.parquet", rows)
-    _write(folder / f"{HELD}.parquet", _held(part, found["relations"]))
+    _write(folder / f"{HELD}.parquet", _holding_relations(part, found["relations"]))
     _write(folder / f"{MEANT}.parquet", _meant(part, found["runs"], found["objects"]))
     _write(folder / f"{STAGE_TIMES}.parquet", _stage_times(found["runs"], found["stages"]))
 
 
-def _held(part: Partition, relations: pa.Table) -> pa.Table:
+def _holding_relations(part: Partition, relations: pa.Table) -> pa.Table:
     """The intervals in which relations held."""
     compute = imported("pyarrow.compute")
-    held = relations.filter(compute.equal(relations["truth"], "true"))
-    columns = {name: held[name] for name in ("relation", "a", "b", "begin", "end")}
-    return imported("pyarrow").table({"number": _numbers(part, held["run"]), **columns})
+    holding = relations.filter(compute.equal(relations["truth"], "true"))
+    columns = {name: holding[name] for name in ("relation", "a", "b", "begin", "end")}
+    return imported("pyarrow").table({"number": _numbers(part, holding["run"]), **columns})
 
 
 def _numbers(part: Partition, runs: pa.ChunkedArray) -> pa.ChunkedArray:

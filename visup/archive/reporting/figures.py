@@ -19,12 +19,12 @@ VERDICT_COLOURS = {
     "unknown": "#8a8f98",
     "none": "#b8bcc4",
 }
-MOST_STAGES = 24
+MAX_STAGES = 24
 
 
-def verdict_figure(found: LakeStatistics) -> Figure | None:
+def verdict_figure(statistics: LakeStatistics) -> Figure | None:
     """Verdicts of the runs by week."""
-    dated = [v for v in found.verdicts if v[0]]
+    dated = [v for v in statistics.verdicts if v[0]]
     if not dated:
         return None
     weeks = sorted({week for week, _, _ in dated})
@@ -44,12 +44,14 @@ def verdict_figure(found: LakeStatistics) -> Figure | None:
     return Figure("verdicts", "Runs per week, by verdict", caption, traces, layout)
 
 
-def duration_figures(found: LakeStatistics) -> list[Figure]:
+def duration_figures(statistics: LakeStatistics) -> list[Figure]:
     """Durations of each stage by week."""
     return [
-        _duration_figure(n, d, [w for w in found.by_week if (w.task, w.stage) == (d.task, d.stage)])
-        for n, d in enumerate(found.durations[:MOST_STAGES])
-        if any((w.task, w.stage) == (d.task, d.stage) for w in found.by_week)
+        _duration_figure(
+            n, d, [w for w in statistics.by_week if (w.task, w.stage) == (d.task, d.stage)]
+        )
+        for n, d in enumerate(statistics.durations[:MAX_STAGES])
+        if any((w.task, w.stage) == (d.task, d.stage) for w in statistics.by_week)
     ]
 
 
@@ -84,11 +86,11 @@ def _duration_figure(number: int, stage: StageDuration, weeks: list[StageDuratio
     return Figure(f"stage-{number}", title, caption, [band, median], _layout("seconds"))
 
 
-def all_figures(found: LakeStatistics) -> Iterator[Figure]:
+def all_figures(statistics: LakeStatistics) -> Iterator[Figure]:
     """All figures in the order of the page."""
-    verdicts = verdict_figure(found)
+    verdicts = verdict_figure(statistics)
     yield from [verdicts] if verdicts else []
-    yield from duration_figures(found)
+    yield from duration_figures(statistics)
 
 
 def _layout(y_title: str) -> dict[str, Any]:

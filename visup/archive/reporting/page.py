@@ -17,17 +17,17 @@ from visup.wording import printable
 DURATION_HEAD = ("task", "stage", "runs", "10th percentile", "median", "90th percentile", "longest")
 
 
-def write_lake_page(found: LakeStatistics, lake: Path, path: Path) -> None:
+def write_lake_page(statistics: LakeStatistics, lake: Path, path: Path) -> None:
     """Write the report of a lake.
 
     Raises:
         ExtraMissingError: There are figures, and Plotly is not installed.
         OutputError: The file cannot be written.
     """
-    write_page(lake_page(found, lake), path)
+    write_page(lake_page(statistics, lake), path)
 
 
-def lake_page(found: LakeStatistics, lake: Path) -> str:
+def lake_page(statistics: LakeStatistics, lake: Path) -> str:
     """The whole page; it depends on the lake only.
 
     Raises:
@@ -35,24 +35,24 @@ def lake_page(found: LakeStatistics, lake: Path) -> str:
     """
     text = {
         "title": escape(lake.absolute().name),
-        "tiles": _tiles(found),
-        "verdicts": figures([verdict_figure(found)], "No run has a date."),
-        "durations": _duration_table(found.durations, ""),
-        "weeks": figures(duration_figures(found), "No stage belongs to a run with a date."),
-        "actors": _duration_table(found.by_actor, "actor = model, or label"),
-        "drifts": _drifts(found),
-        "failures": _failures(found),
+        "tiles": _tiles(statistics),
+        "verdicts": figures([verdict_figure(statistics)], "No run has a date."),
+        "durations": _duration_table(statistics.durations, ""),
+        "weeks": figures(duration_figures(statistics), "No stage belongs to a run with a date."),
+        "actors": _duration_table(statistics.by_actor, "actor = model, or label"),
+        "drifts": _drifts(statistics),
+        "failures": _failures(statistics),
     }
-    return archive_page("lake.html", text, list(all_figures(found)), "all runs")
+    return archive_page("lake.html", text, list(all_figures(statistics)), "all runs")
 
 
-def archive_page(template: str, text: Mapping[str, str], drawn: list[Figure], kind: str) -> str:
+def archive_page(template: str, text: Mapping[str, str], figures: list[Figure], kind: str) -> str:
     """A page about many runs.
 
     Args:
         template: File name in this folder.
         text: Placeholder -> HTML.
-        drawn: The figures of the page.
+        figures: The figures of the page.
         kind: Kind of page, in a word or two.
 
     Raises:
@@ -60,18 +60,18 @@ def archive_page(template: str, text: Mapping[str, str], drawn: list[Figure], ki
     """
     body = (files("visup.archive.reporting") / template).read_text(encoding="utf-8")
     shown = {name: printable(words) for name, words in text.items()}
-    return filled_page(body, shown, drawn, f"{shown['title']} (visup, {kind})")
+    return filled_page(body, shown, figures, f"{shown['title']} (visup, {kind})")
 
 
-def _tiles(found: LakeStatistics) -> str:
+def _tiles(statistics: LakeStatistics) -> str:
     ended: dict[str, int] = {}
-    for _, verdict, count in found.verdicts:
+    for _, verdict, count in statistics.verdicts:
         ended[verdict] = ended.get(verdict, 0) + count
-    facts = {"runs": f"{found.runs:,}"}
-    if found.hours < 1.0:
-        facts["minutes of video"] = f"{60.0 * found.hours:.1f}"
+    facts = {"runs": f"{statistics.runs:,}"}
+    if statistics.hours < 1.0:
+        facts["minutes of video"] = f"{60.0 * statistics.hours:.1f}"
     else:
-        facts["hours of video"] = f"{found.hours:,.1f}"
+        facts["hours of video"] = f"{statistics.hours:,.1f}"
     facts |= {v.replace("_", " "): f"{n:,}" for v, n in sorted(ended.items()) if v != "none"}
     tiles = (f"<div><dt>{escape(k)}</dt><dd>{escape(v)}</dd></div>" for k, v in facts.items())
     return f"<dl class=tiles>{''.join(tiles)}</dl>"
@@ -92,7 +92,7 @@ def _duration_table(of: Sequence[StageDuration], group: str) -> str:
     return html_table(head, rows, "No run has a stage.")
 
 
-def _drifts(found: LakeStatistics) -> str:
+def _drifts(statistics: LakeStatistics) -> str:
     rows = [
         (
             d.task,
@@ -103,17 +103,17 @@ def _drifts(found: LakeStatistics) -> str:
             f"{d.runs:,}",
             f"{d.chance:.1g}",
         )
-        for d in found.drifts
+        for d in statistics.drifts
     ]
     head = ("task", "stage", "first quarter", "last quarter", "change", "runs", "p")
     return html_table(head, rows, "No stage has become significantly slower or faster.")
 
 
-def _failures(found: LakeStatistics) -> str:
+def _failures(statistics: LakeStatistics) -> str:
     rows = [
         (f.stage or "none", f.alert.replace("_", " ") or "none", f"{f.runs:,}", f"{f.share:.0%}",
          f"{f.clip} ({f.run[:8]})")
-        for f in found.failures
+        for f in statistics.failures
     ]  # fmt: skip
     head = ("failed stage", "most severe alert", "runs", "share of failures", "example")
     return html_table(head, rows, "No run failed.")

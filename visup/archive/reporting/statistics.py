@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from visup.archive.asking.database import LakeDatabase
+from visup.archive.querying.database import LakeDatabase
 
-TOOK = (
+DURATIONS_SQL = (
     "(SELECT run, task, stage, sum(seconds) AS took FROM stages"
     " WHERE status IN ('active', 'progressing', 'paused', 'stalled') GROUP BY ALL)"
 )
@@ -20,7 +20,7 @@ QUANTILES = (
     "count(*) AS runs, quantile_cont(took, 0.1) AS low, median(took) AS mid,"
     " quantile_cont(took, 0.9) AS high, max(took) AS longest"
 )
-BY = """
+GROUPED_SQL = """
     SELECT run, e.key || ' = ' || e.value AS who FROM (
         SELECT run, unnest(map_entries(labels)) AS e FROM lake.runs)
     UNION ALL
@@ -29,11 +29,11 @@ BY = """
                '"MAP(VARCHAR, VARCHAR[])"'))) AS e FROM lake.runs)
 """
 """The cast and the manifest labels of a run."""
-LEAST_CHANGE = 0.05
-CHANCE = 0.01
+MIN_CHANGE = 0.05
+SIGNIFICANCE = 0.01
 """Significance level of a drift, corrected for the number of stages."""
-LEAST_RUNS = 10
-MOST_MODES = 20
+MIN_RUNS = 10
+MAX_MODES = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +149,7 @@ def lake_statistics(database: LakeDatabase) -> LakeStatistics:
         tuple(verdicts),
         _durations(database, "''", ""),
         _durations(database, "week::VARCHAR", "JOIN runs USING (run) WHERE week IS NOT NULL"),
-        _durations(database, "who", f"JOIN ({BY}) USING (run)"),
+        _durations(database, "who", f"JOIN ({GROUPED_SQL}) USING (run)"),
         drifts(database),
         failure_modes(database),
     )
@@ -160,12 +160,14 @@ def drifts(database: LakeDatabase) -> tuple[Drift, ...]:
     taken: dict[tuple[str, str], list[tuple[float, float]]] = {}
     for task, stage, at, duration in _rows(
         database,
-        f"SELECT task, stage, epoch(taken), took FROM {TOOK} JOIN lake.runs USING (run)"
+        f"SELECT task, stage, epoch(taken), took FROM {DURATIONS_SQL} JOIN lake.runs USING (run)"
         " WHERE taken IS NOT NULL ORDER BY taken, run",
     ):
         taken.setdefault((task, stage), []).append((at, duration))
-    tried = [_drift(*key, np.array(of)) for key, of in taken.items() if len(of) >= LEAST_RUNS]
-    found = [d for d in tried if d.chance < CHANCE / len(tried) and abs(d.change) >= LEAST_CHANGE]
+    tried = [_drift(*key, np.array(of)) for key, of in taken.items() if len(of) >= MIN_RUNS]
+    found = [
+        d for d in tried if d.chance < SIGNIFICANCE / len(tried) and abs(d.change) >= MIN_CHANGE
+    ]
     return tuple(sorted(found, key=lambda d: (-abs(d.change), d.task, d.stage)))
 
 
@@ -197,11 +199,11 @@ def failure_modes(database: LakeDatabase) -> tuple[FailureMode, ...]:
         GROUP BY ALL ORDER BY n DESC, 1, 2
         """,
     )
-    return tuple(FailureMode(*row) for row in found[:MOST_MODES])
+    return tuple(FailureMode(*row) for row in found[:MAX_MODES])
 
 
 def _durations(database: LakeDatabase, group: str, more: str) -> tuple[StageDuration, ...]:
-    sql = f"SELECT task, stage, {group} AS part, {QUANTILES} FROM {TOOK} {more}"
+    sql = f"SELECT task, stage, {group} AS part, {QUANTILES} FROM {DURATIONS_SQL} {more}"
     return tuple(
         StageDuration(*row) for row in _rows(database, f"{sql} GROUP BY ALL ORDER BY 1, 2, 3")
     )

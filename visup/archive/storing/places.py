@@ -89,19 +89,19 @@ def settle(lake: Lake, store: LakeStore | None) -> None:
 
 
 def pushed(
-    store: LakeStore | None, lake: Lake, tell: Callable[[ClipOutcome], None]
+    store: LakeStore | None, lake: Lake, on_outcome: Callable[[ClipOutcome], None]
 ) -> Callable[[ClipOutcome], None]:
-    """Wrap `tell` to upload each run first.
+    """Wrap `on_outcome` to upload each run first.
 
     An unreachable store stops nothing: the run is committed locally and is uploaded with the next `push`.
     """
     if store is None:
-        return tell
+        return on_outcome
 
-    def told(outcome: ClipOutcome) -> None:
+    def push_and_report(outcome: ClipOutcome) -> None:
         if not outcome.failure:
             with suppress(OutputError):
                 store.push_run(lake, outcome.run)
-        tell(outcome)
+        on_outcome(outcome)
 
-    return told
+    return push_and_report

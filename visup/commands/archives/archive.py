@@ -109,7 +109,7 @@ def run(
     input, 130 if you stopped it.
     """
     from visup.archive.filling.clips import clips_of
-    from visup.archive.filling.filling import begin_anew, only_filler
+    from visup.archive.filling.filling import clear_attempts, only_filler
     from visup.archive.filling.plan import make_plan
     from visup.archive.storing.places import create_lake, is_lake, open_lake, settle, store_of
     from visup.terminal.console import make_console
@@ -125,7 +125,7 @@ def run(
         return
     lake, store = create_lake(into), store_of(into)
     with only_filler(lake):
-        begin_anew(lake, retry=options.retry)
+        clear_attempts(lake, retry=options.retry)
         todo = make_plan(lake, clips, settings, options.cutting)
         _print_plan(console, into, todo, pool.processes)
         result = _filled(console, lake, todo, pool, store)
@@ -192,9 +192,9 @@ def compact(
         if store:
             store.push(found)
         merged = _counted(done.joined, "run")
-        said = f"Merged {merged}; the lake has {_counted(done.partitions, 'partition')}."
+        parts = f"Merged {merged}; the lake has {_counted(done.partitions, 'partition')}."
         gone = f" Replaced files of {done.tidied} runs were removed." if done.tidied else ""
-    echo(f"{said}{gone}")
+    echo(f"{parts}{gone}")
 
 
 app.command("calibrate")(calibrate)
@@ -211,8 +211,8 @@ def report(
     ] = None,
 ) -> None:
     """Write a page about all runs: stage durations by week and actor, drift, and how runs fail."""
-    from visup.archive.asking.database import open_database
     from visup.archive.filling.stores import is_url
+    from visup.archive.querying.database import open_database
     from visup.archive.reporting.page import write_lake_page
     from visup.archive.reporting.statistics import lake_statistics
     from visup.archive.storing.places import open_lake
@@ -253,11 +253,11 @@ def replay(
 def _changed(one: RunChanges) -> str:
     """What changes in a run, in one line."""
     lost, gained = one.alerts
-    said = [f"{kind}: {lost.get(kind, 0)} lost, {gained.get(kind, 0)} gained"
+    parts = [f"{kind}: {lost.get(kind, 0)} lost, {gained.get(kind, 0)} gained"
             for kind in sorted({*lost, *gained})]  # fmt: skip
     before, after = one.diff.verdicts
-    said += [f"verdict {before or 'none'} -> {after or 'none'}"] if before != after else []
-    return f"{one.clip}: {'; '.join(said) or 'other events'} ({one.folder})"
+    parts += [f"verdict {before or 'none'} -> {after or 'none'}"] if before != after else []
+    return f"{one.clip}: {'; '.join(parts) or 'other events'} ({one.folder})"
 
 
 def _filled(
@@ -324,8 +324,8 @@ def _print_outcome(console: Console, outcome: ClipOutcome) -> None:
     if outcome.failure:
         _print_failure(console, outcome.failure)
         return
-    said = f"{outcome.source}: {outcome.verdict or 'watched'}, {outcome.video_s:.0f} s of video"
-    console.print(f"{said} in {outcome.wall_s:.0f} s", soft_wrap=True, markup=False)
+    parts = f"{outcome.source}: {outcome.verdict or 'watched'}, {outcome.video_s:.0f} s of video"
+    console.print(f"{parts} in {outcome.wall_s:.0f} s", soft_wrap=True, markup=False)
 
 
 def _print_failure(console: Console, failed: FailedClip) -> None:
@@ -338,16 +338,16 @@ def _print_plan(console: Console, into: str, plan: Plan, workers: int) -> None:
     from visup.archive.filling.filling import estimated_s
     from visup.archive.storing.places import copy_of
 
-    said = [f"{len(plan.jobs)} to watch ({_size(plan.bytes)})"]
+    parts = [f"{len(plan.jobs)} to watch ({_size(plan.bytes)})"]
     cut = [len(job.spans) for job in plan.jobs if job.spans]
-    said += [f"{len(cut)} of them in {sum(cut)} chunks"] if cut else []
-    said += [f"{plan.present} already in the lake"] if plan.present else []
-    said += [f"{plan.same} duplicates"] if plan.same else []
-    said += [f"{len(plan.failed)} cannot be watched"] if plan.failed else []
+    parts += [f"{len(cut)} of them in {sum(cut)} chunks"] if cut else []
+    parts += [f"{plan.present} already in the lake"] if plan.present else []
+    parts += [f"{plan.same} duplicates"] if plan.same else []
+    parts += [f"{len(plan.failed)} cannot be watched"] if plan.failed else []
     seconds = estimated_s(copy_of(into), plan.bytes, workers)
     if plan.jobs and seconds is not None:
-        said.append(f"about {_duration(seconds)} on {_counted(max(1, workers), 'worker')}")
-    console.print(f"Clips: {', '.join(said)}.", soft_wrap=True, markup=False)
+        parts.append(f"about {_duration(seconds)} on {_counted(max(1, workers), 'worker')}")
+    console.print(f"Clips: {', '.join(parts)}.", soft_wrap=True, markup=False)
 
 
 def _closing(result: FillResult) -> Iterator[str]:

@@ -39,7 +39,7 @@ def calibrate(
     as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")] = False,
 ) -> None:
     """Check calibration: how often statements of a given confidence were right."""
-    from visup.archive.asking.database import open_database
+    from visup.archive.querying.database import open_database
     from visup.archive.storing.places import open_lake
     from visup.evaluation.archive.calibrating import read_truth, reliabilities, truth_by_run
     from visup.evaluation.archive.calibration_page import calibration_page
@@ -79,8 +79,8 @@ def _fitted(lake: Lake, known: Mapping[str, RunTruth], path: Path) -> str:
     try:
         write_atomically(path, fitted_settings(evidence, how).encode())
     except OSError as fault:
-        said = fault.strerror or str(fault)
-        raise OutputError(f"the settings cannot be written ({said})", where=str(path)) from fault
+        reason = fault.strerror or str(fault)
+        raise OutputError(f"the settings cannot be written ({reason})", where=str(path)) from fault
     return f"{how} Fitted: {evidence:.3f}, written to {path}."
 
 

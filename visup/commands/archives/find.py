@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
-    from visup.archive.finding.judge import Hit
+    from visup.archive.finding.pattern_evaluator import Hit
     from visup.archive.finding.search import FoundRun
 
 
@@ -60,9 +60,9 @@ def find(
     Runs whose recorded relations rule the condition out are skipped. Exit code: 0 if there are hits, 1 if
     there are none, 2 for bad input.
     """
-    from visup.archive.asking.database import open_database
     from visup.archive.finding.search import find as look
     from visup.archive.finding.search import read_search
+    from visup.archive.querying.database import open_database
     from visup.archive.storing.places import open_lake
     from visup.terminal.console import make_console
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
     from rich.console import Console
 
-    from visup.archive.asking.database import LakeDatabase
+    from visup.archive.querying.database import LakeDatabase
 
 SHOWN_ROWS = 50
 
@@ -53,8 +53,8 @@ def query(
 
     Exit code: 0 if the query ran, even with an empty result, 2 if it did not.
     """
-    from visup.archive.asking.answers import answer_rows, as_csv, format_of, write_answer
-    from visup.archive.asking.database import open_database
+    from visup.archive.querying.answers import answer_rows, as_csv, format_of, write_answer
+    from visup.archive.querying.database import open_database
     from visup.archive.storing.places import open_lake
     from visup.terminal.console import echo, echo_json, make_console
 
@@ -87,7 +87,7 @@ def _show(console: Console, answer: pa.Table) -> None:
     from rich.markup import escape
     from rich.text import Text
 
-    from visup.archive.asking.answers import cell
+    from visup.archive.querying.answers import cell
     from visup.terminal.tables import table
 
     if not answer.num_rows:
@@ -105,7 +105,7 @@ def _show(console: Console, answer: pa.Table) -> None:
 
 
 def _show_examples(console: Console, database: LakeDatabase) -> None:
-    from visup.archive.asking.examples import EXAMPLES
+    from visup.archive.querying.examples import EXAMPLES
 
     for number, question in enumerate(EXAMPLES, 1):
         console.print(f"{number}. {question.words}", markup=False, style="bold")
@@ -115,12 +115,12 @@ def _show_examples(console: Console, database: LakeDatabase) -> None:
 
 
 def _show_tables(console: Console, database: LakeDatabase) -> None:
-    from visup.archive.asking.views import RELATIONS, VIEWS
+    from visup.archive.querying.views import RELATIONS, VIEWS
 
     for name, (meaning, _) in VIEWS.items():
         columns = database.ask(f"SELECT * FROM {name} LIMIT 0").column_names
         console.print(f"{name}: {meaning}", markup=False, soft_wrap=True)
         console.print(f"    {', '.join(columns)}", markup=False, soft_wrap=True)
-    said = f"Each relation, with the times at which it held: {', '.join(RELATIONS)}"
-    console.print(said, markup=False, soft_wrap=True)
+    sentence = f"Each relation, with the times at which it held: {', '.join(RELATIONS)}"
+    console.print(sentence, markup=False, soft_wrap=True)
     console.print("The stored tables: lake.runs, lake.objects, ...", markup=False)

@@ -120,14 +120,14 @@ def _rule_meaning(document: TextDocument, word: NameUse) -> str | None:
 
 def _show_meaning(ls: LanguageServer, params: lsp.HoverParams) -> lsp.Hover | None:
     document, word = _word(ls, params)
-    said = None
+    text = None
     if word is not None and holds_rules(document):
-        said = _rule_meaning(document, word)
+        text = _rule_meaning(document, word)
     elif word is not None:
-        said = hover(document.source, _file(document), word)
-    if word is None or said is None:
+        text = hover(document.source, _file(document), word)
+    if word is None or text is None:
         return None
-    content = lsp.MarkupContent(lsp.MarkupKind.Markdown, said)
+    content = lsp.MarkupContent(lsp.MarkupKind.Markdown, text)
     return lsp.Hover(content, _range(document, word.span))
 
 
@@ -213,17 +213,17 @@ class _EditorFiles:
 
 
 def _diagnostic(document: TextDocument, fault: Diagnostic) -> lsp.Diagnostic:
-    said = [fault.message]
-    said += [f"expected: {fault.expected}"] if fault.expected else []
-    said += [f"hint: {fault.hint}"] if fault.hint else []
+    text = [fault.message]
+    text += [f"expected: {fault.expected}"] if fault.expected else []
+    text += [f"hint: {fault.hint}"] if fault.hint else []
     place = fault.place
     if place.file != _file(document):
-        said.insert(0, f"in {place}")
+        text.insert(0, f"in {place}")
         place = SourceLocation(_file(document), 1, 1)
     span = Span(place.line, place.column, place.line, place.column + place.length)
     return lsp.Diagnostic(
         _range(document, span),
-        "\n".join(said),
+        "\n".join(text),
         severity=lsp.DiagnosticSeverity.Error,
         code=fault.code or None,
         source=f"visup: {explain(fault.code).title}" if fault.code else "visup",

@@ -10,8 +10,8 @@ from pathlib import Path, PurePath
 
 from visup.agent.model.errors import SourceError
 from visup.agent.storage.text_file import read_text_file
-from visup.archive.asking.database import LakeDatabase
-from visup.archive.filling.clips import LARGEST_MANIFEST_BYTES
+from visup.archive.filling.clips import MAX_MANIFEST_BYTES
+from visup.archive.querying.database import LakeDatabase
 from visup.evaluation.calibration import Calibration
 
 COLUMNS = ("source", "verdict", "objects", "stages")
@@ -79,7 +79,7 @@ def read_truth(path: Path) -> dict[str, RunTruth]:
         SourceError: It cannot be read, or is malformed.
     """
     try:
-        reader = csv.DictReader(StringIO(read_text_file(path, LARGEST_MANIFEST_BYTES)), strict=True)
+        reader = csv.DictReader(StringIO(read_text_file(path, MAX_MANIFEST_BYTES)), strict=True)
         head = reader.fieldnames or ()
         if "source" not in head or set(head) - set(COLUMNS):
             raise SourceError(

@@ -9,11 +9,11 @@ from typing import Any
 
 from visup.agent import Truth
 from visup.agent.model.step import Step
-from visup.archive.asking.database import open_database
-from visup.archive.finding.judge import ConditionJudge
 from visup.archive.finding.pattern import read_pattern
+from visup.archive.finding.pattern_evaluator import PatternEvaluator
 from visup.archive.finding.search import ConditionSearch
 from visup.archive.lake import Lake
+from visup.archive.querying.database import open_database
 from visup.evaluation.archive.conditions import random_conditions
 from visup.evaluation.figures import Progress
 from visup.rules.safety.queries import verdicts
@@ -91,9 +91,9 @@ def _compare(lake: Lake, texts: Sequence[str], rules: Path, found: FindCompariso
         possible = [set(search.possible_runs(database)) for search in searches]
     for run in lake.runs():
         recording, settings = lake.recorded(run)
-        judges = [ConditionJudge(s.pattern) for s in searches]
+        judges = [PatternEvaluator(s.pattern) for s in searches]
 
-        def look(step: Step, judges: list[ConditionJudge] = judges) -> None:
+        def look(step: Step, judges: list[PatternEvaluator] = judges) -> None:
             for n, judge in enumerate(judges):
                 _compare_step(step, judge, f"f{n}", texts[n], found)
 
@@ -109,7 +109,7 @@ def _compare(lake: Lake, texts: Sequence[str], rules: Path, found: FindCompariso
 
 
 def _compare_step(
-    step: Step, judge: ConditionJudge, rule: str, text: str, found: FindComparison
+    step: Step, judge: PatternEvaluator, rule: str, text: str, found: FindComparison
 ) -> None:
     judge(step)
     said = verdicts(step.mind, rule)

@@ -7,10 +7,10 @@ import time
 from pathlib import Path
 from typing import Any
 
-from visup.archive.asking.database import LakeDatabase, open_database
 from visup.archive.finding.search import find, read_search
 from visup.archive.joining.manifest import read_manifest
 from visup.archive.lake import Lake
+from visup.archive.querying.database import LakeDatabase, open_database
 from visup.evaluation.archive.multiplied import lend_recordings, multiply
 from visup.evaluation.figures import Progress
 

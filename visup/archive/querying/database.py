@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from visup.agent.model.errors import VisupError
-from visup.archive.asking.views import definitions, escaped, quoted
 from visup.archive.extra import imported
 from visup.archive.joining.manifest import FOLDER
 from visup.archive.lake import TABLES_FOLDER, Lake, LakeSnapshot
+from visup.archive.querying.views import definitions, escaped, quoted
 
 if TYPE_CHECKING:
     import pyarrow as pa

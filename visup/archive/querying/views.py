@@ -12,8 +12,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from visup.archive.asking.stage_times import CLIP as _CLIP
-from visup.archive.asking.stage_times import stage_times
+from visup.archive.querying.stage_times import CLIP as _CLIP
+from visup.archive.querying.stage_times import stage_times
 from visup.archive.schema import TABLES
 from visup.rules.predicates.snapshot import RELATION_NAMES
 

@@ -48,7 +48,7 @@ class ClipPiece:
         return folder if self.chunk is None else folder / f"{self.chunk:04}"
 
 
-class PieceBook:
+class PieceQueue:
     """The queue of pieces, and the progress of their clips.
 
     Args:
@@ -100,7 +100,7 @@ def watch_piece(lake: Lake, piece: ClipPiece, watch: Watch) -> ClipOutcome:
     return outcome
 
 
-def given_up(lake: Lake, piece: ClipPiece) -> ClipOutcome:
+def crashed_outcome(lake: Lake, piece: ClipPiece) -> ClipOutcome:
     """The outcome of a clip whose piece crashed its workers."""
     Attempts(lake.path, piece.job.run).exhaust()
     return ClipOutcome(piece.job.run, piece.job.settings.source, failure=put_aside(piece.job))
@@ -120,7 +120,7 @@ def _watch_chunk(lake: Lake, piece: ClipPiece, chunk: int, watch: Watch) -> Clip
     folder = lake.path / WORK / f"{piece.key}-{os.getpid()}"
     try:
         if not attempts.begin():
-            return given_up(lake, piece)
+            return crashed_outcome(lake, piece)
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
         watch(job.settings, folder, job.spans[chunk].frames)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 from visup.agent import Mind, Truth
 from visup.agent.model.step import Step
-from visup.archive.stretches import StepTime, Stretches
+from visup.archive.value_intervals import IntervalCollector, StepTime
 from visup.rules.safety.compiled_rules import compile_rules
 from visup.rules.safety.expression import Expression, ExpressionResult
 from visup.rules.safety.reasoner import rule_memory
@@ -40,30 +40,32 @@ class Hit:
 
 
 @dataclass(slots=True)
-class ConditionJudge:
+class PatternEvaluator:
     """Evaluates a condition step by step."""
 
     pattern: Expression
     before: ExpressionResult | None = None
     last: StepTime | None = None
-    stretches: Stretches[tuple[int, ...], tuple[str, Objects]] = field(default_factory=Stretches)
+    intervals: IntervalCollector[tuple[int, ...], tuple[str, Objects]] = field(
+        default_factory=IntervalCollector
+    )
     names: dict[tuple[int, int], str] = field(default_factory=dict)
     confidences: dict[tuple[Objects, int], float] = field(default_factory=dict)
 
     def __call__(self, step: Step) -> None:
         """Evaluate it after one step."""
-        self.judge(as_rules_see(step.mind))
+        self.evaluate(before_tasks(step.mind))
 
-    def judge(self, mind: Mind) -> None:
+    def evaluate(self, mind: Mind) -> None:
         """Evaluate it in the next mind of a run, given as rules see it."""
         number = self.last.number + 1 if self.last else 0
         self.last = StepTime(number, mind.frame_index, mind.time)
         self.before = self.pattern.judge(mind, self.before)
-        self.stretches.add(self.last, self._values(mind, self.before))
+        self.intervals.add(self.last, self._values(mind, self.before))
 
     def hits(self) -> tuple[Hit, ...]:
         """All hits so far, by time."""
-        found = self.stretches.finish(self.last) if self.last else []
+        found = self.intervals.finish(self.last) if self.last else []
         return tuple(
             Hit(
                 s.value[1],
@@ -92,12 +94,12 @@ class ConditionJudge:
             if key not in found or (truth is Truth.TRUE and found[key][0] != Truth.TRUE):
                 found[key] = truth.value, reading.objects
             if truth is Truth.TRUE:
-                self._note_confidence(mind, reading.objects)
+                self._record_confidence(mind, reading.objects)
         for objects in found:
             self.names.update({(self.last.number, i): mind.objects[i].name for i in objects})
         return found
 
-    def _note_confidence(self, mind: Mind, objects: Objects) -> None:
+    def _record_confidence(self, mind: Mind, objects: Objects) -> None:
         rule = self.pattern.rule
         assignment = dict(zip(rule.variables, objects, strict=True))
         for call in compile_rules((rule,)).related(rule):
@@ -115,6 +117,6 @@ class ConditionJudge:
         return round(min(found), 6) if found else None
 
 
-def as_rules_see(mind: Mind) -> Mind:
+def before_tasks(mind: Mind) -> Mind:
     """A mind with the task beliefs that the rules of its step were evaluated with."""
     return replace(mind, tasks=rule_memory(mind).tasks)

@@ -26,7 +26,7 @@ class StepTime:
 
 
 @dataclass(frozen=True, slots=True)
-class Stretch(Generic[Key, Value]):
+class ValueInterval(Generic[Key, Value]):
     """An interval in which a key had one value.
 
     Attributes:
@@ -46,10 +46,10 @@ class Stretch(Generic[Key, Value]):
     @property
     def columns(self) -> tuple[float, float, int, int, bool]:
         """Begin, end, first frame, number of steps, open: the columns of the tables of a lake."""
-        return stretch_columns(self.begin, self.end, self.open)
+        return interval_columns(self.begin, self.end, self.open)
 
 
-def stretch_columns(
+def interval_columns(
     begin: StepTime, end: StepTime, open_stretches: bool
 ) -> tuple[float, float, int, int, bool]:
     """Begin, end, first frame, number of steps, open: the columns of the tables of a lake."""
@@ -63,27 +63,29 @@ def stretch_columns(
 
 
 @dataclass(slots=True)
-class Stretches(Generic[Key, Value]):
-    """Collects values step by step into stretches.
+class IntervalCollector(Generic[Key, Value]):
+    """Collects values step by step into intervals.
 
     Attributes:
-        closed: The finished stretches.
+        closed: The finished intervals.
     """
 
-    closed: list[Stretch[Key, Value]] = field(default_factory=list)
+    closed: list[ValueInterval[Key, Value]] = field(default_factory=list)
     _open: dict[Key, tuple[Value, StepTime]] = field(default_factory=dict)
 
     def add(self, at: StepTime, values: Mapping[Key, Value]) -> None:
         """Add the values of one step; a key that is missing has none."""
         for key, (value, begin) in list(self._open.items()):
             if values.get(key) != value:
-                self.closed.append(Stretch(key, value, begin, at, False))
+                self.closed.append(ValueInterval(key, value, begin, at, False))
                 del self._open[key]
         for key, value in values.items():
             if key not in self._open:
                 self._open[key] = value, at
 
-    def finish(self, last: StepTime) -> list[Stretch[Key, Value]]:
-        """All stretches, the open ones last."""
-        open_stretches = [Stretch(k, v, begin, last, True) for k, (v, begin) in self._open.items()]
+    def finish(self, last: StepTime) -> list[ValueInterval[Key, Value]]:
+        """All intervals, the open ones last."""
+        open_stretches = [
+            ValueInterval(k, v, begin, last, True) for k, (v, begin) in self._open.items()
+        ]
         return [*self.closed, *open_stretches]

@@ -17,19 +17,19 @@ from threading import Event, Thread
 from typing import Any
 
 from visup.archive.extra import imported
-from visup.archive.filling.pieces import watch_piece
+from visup.archive.filling.piece_queue import watch_piece
 from visup.archive.filling.pool_settings import PoolSettings
 
-MOST_RENEWALS = 6
+MAX_RENEWALS = 6
 """Attempts to replace lost workers until all are back; the wait doubles after each failure, to a minute in
 all."""
 START_S = 300.0
 """How long a replacement may take to start, seconds; a busy machine needs minutes."""
-LOOK_S = 1.0
+POLL_S = 1.0
 
 
 @dataclass(slots=True)
-class OwnWorkers:
+class LocalWorkers:
     """Workers started by this process.
 
     Attributes:
@@ -41,10 +41,10 @@ class OwnWorkers:
     cluster: Any
     count: int
     renewals: int = field(default=0, init=False)
-    _not_before: float = field(default=0.0, init=False)
+    _retry_at: float = field(default=0.0, init=False)
 
     @contextmanager
-    def kept(self, client: Any, starve: Callable[[], None]) -> Iterator[None]:
+    def supervised(self, client: Any, starve: Callable[[], None]) -> Iterator[None]:
         """Replace lost workers while the context is open.
 
         Args:
@@ -53,19 +53,19 @@ class OwnWorkers:
         """
         over = Event()
 
-        def look() -> None:
+        def watch() -> None:
             last_alive = time.monotonic()
             # A scheduler that is gone is reported where its results are awaited.
             with suppress(OSError, RuntimeError):
-                while not over.wait(LOOK_S):
+                while not over.wait(POLL_S):
                     if alive := len(client.ncores()):
                         last_alive = time.monotonic()
-                    self._renew(alive)
-                    if time.monotonic() - last_alive > START_S or self._given_up(alive):
+                    self._replace_lost(alive)
+                    if time.monotonic() - last_alive > START_S or self._renewals_exhausted(alive):
                         starve()
                         return
 
-        watcher = Thread(target=look, name="workers", daemon=True)
+        watcher = Thread(target=watch, name="workers", daemon=True)
         watcher.start()
         try:
             yield
@@ -73,20 +73,20 @@ class OwnWorkers:
             over.set()
             watcher.join()
 
-    def _renew(self, alive: int) -> None:
+    def _replace_lost(self, alive: int) -> None:
         """Replace the workers that Dask has given up; `alive` are working."""
         if alive >= self.count:
             self.renewals = 0
         lost, now = self._lost(), time.monotonic()
-        if not lost or self.renewals >= MOST_RENEWALS or now < self._not_before:
+        if not lost or self.renewals >= MAX_RENEWALS or now < self._retry_at:
             return
-        self._not_before = now + 2.0**self.renewals
+        self._retry_at = now + 2.0**self.renewals
         self.renewals += 1
         self.cluster.sync(self.cluster.scale_down, lost)
         self.cluster.scale(self.count)
 
-    def _given_up(self, alive: int) -> bool:
-        return not alive and self.renewals >= MOST_RENEWALS and len(self._lost()) >= self.count
+    def _renewals_exhausted(self, alive: int) -> bool:
+        return not alive and self.renewals >= MAX_RENEWALS and len(self._lost()) >= self.count
 
     def _lost(self) -> list[Any]:
         """Names of the workers that Dask has given up."""
@@ -98,7 +98,7 @@ class OwnWorkers:
 
 
 @contextmanager
-def own_workers(settings: PoolSettings) -> Iterator[OwnWorkers]:
+def local_workers(settings: PoolSettings) -> Iterator[LocalWorkers]:
     """Workers on this machine, ended with the context.
 
     Raises:
@@ -119,7 +119,7 @@ def own_workers(settings: PoolSettings) -> Iterator[OwnWorkers]:
             silence_logs=logging.CRITICAL,
         ) as cluster,
     ):
-        yield OwnWorkers(cluster, settings.processes)
+        yield LocalWorkers(cluster, settings.processes)
 
 
 @contextmanager
