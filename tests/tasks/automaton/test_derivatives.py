@@ -93,7 +93,7 @@ def walked(task: Task) -> set[Word]:
 
 @LAW
 @given(small)
-def test_moving_through_a_course_sees_exactly_what_it_means(course: Course) -> None:
+def test_derivatives_accept_exactly_the_sequences_of_a_course(course: Course) -> None:
     task = Task((Stage("t", course),))
     if any(
         isinstance(c, Repeated) and c.mark != "?" and Grammar(task).nullable(c.item)
@@ -111,7 +111,7 @@ def _all(course: Course) -> list[Course]:
 
 @LAW
 @given(small)
-def test_a_course_may_be_left_out_when_the_empty_word_is_in_it(course: Course) -> None:
+def test_a_course_is_nullable_if_it_accepts_the_empty_sequence(course: Course) -> None:
     grammar = Grammar(Task((Stage("t", course),)))
     assert grammar.nullable(course) == (() in words(course))
 

@@ -31,7 +31,7 @@ ROW = "abcde"
 
 
 @given(st.sets(st.sampled_from(ROW)), st.sets(st.sampled_from(ROW)))
-def test_in_a_row_the_first_that_is_held_behind_a_lacking_one(
+def test_the_first_held_action_behind_a_missing_one_is_found(
     held: set[str], lacking: set[str]
 ) -> None:
     behind = [s for s in ROW if s in held and any(x in lacking for x in ROW[: ROW.index(s)])]
@@ -61,6 +61,6 @@ def test_courses(course: str, held: str, lacking: str, expected: tuple[str, str]
     assert found(course, "abc", held, lacking) == expected
 
 
-def test_a_task_without_end_is_searched_up_to_a_bound() -> None:
+def test_an_endless_task_is_searched_up_to_a_limit() -> None:
     automaton = automaton_of("<a> (<t> <b>)?", "ab")
     assert 2 <= len(later_steps(automaton, [automaton.start[0][0]])) < 10

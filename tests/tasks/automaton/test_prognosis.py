@@ -39,7 +39,7 @@ def belief(played: ScriptedRun, time: float) -> TaskBelief:
 
 
 @pytest.mark.parametrize("spans", [FAILS, SUCCEEDS])
-def test_hypotheses_share_all_probability_and_what_is_told_is_a_marginal(
+def test_hypotheses_sum_to_one_and_reported_beliefs_are_marginals(
     spans: tuple[RelationSpan, ...],
 ) -> None:
     played = watch(*spans)
@@ -57,14 +57,14 @@ def test_hypotheses_share_all_probability_and_what_is_told_is_a_marginal(
             assert told.confidence == pytest.approx(sum(done))
 
 
-def test_how_sure_it_is_does_not_hang_on_the_frame_rate() -> None:
+def test_confidence_does_not_depend_on_the_frame_rate() -> None:
     runs = [watch(*FAILS, until=15.0, fps=fps) for fps in (5.0, 10.0, 25.0)]
     for time in (8.0, 12.6, 15.0):
         told = [belief(run, time).confidence for run in runs]
         assert max(told) - min(told) < 0.1
 
 
-def test_what_comes_next_is_told_with_its_probability() -> None:
+def test_prospects_have_probabilities() -> None:
     played = watch(*SUCCEEDS)
     early = belief(played, 6.0)
     assert [p.stage for p in early.prospects] == ["captured"]
@@ -109,7 +109,7 @@ def test_success_falls_with_a_failure_and_rises_towards_the_end() -> None:
     assert hope(bad, 25.0) == 0.0
 
 
-def test_what_was_told_done_is_taken_back_when_later_evidence_overturns_it() -> None:
+def test_a_stage_reported_done_is_revised_when_later_evidence_contradicts_it() -> None:
     played = watch(
         RelationSpan("converging", 0.5, 5.0),
         RelationSpan("touching", 4.8, 5.3),  # a glimpse of a touch, and the approach goes on
@@ -125,7 +125,7 @@ def test_what_was_told_done_is_taken_back_when_later_evidence_overturns_it() -> 
     assert not [e for e in watch(*SUCCEEDS).events if e.kind == "stage_revised"]
 
 
-def test_a_relation_that_is_not_sure_counts_for_less() -> None:
+def test_uncertain_relations_count_for_less() -> None:
     for seen in (ActionStatus.NEITHER, ActionStatus.CONTRARY):
         fits = [SUPERVISION_HMM.fit(seen, sure, 1.0) for sure in (1.0, 0.7, 0.3, 0.0)]
         assert fits == sorted(fits)
@@ -134,7 +134,7 @@ def test_a_relation_that_is_not_sure_counts_for_less() -> None:
     assert halves == pytest.approx(SUPERVISION_HMM.fit(ActionStatus.CONTRARY, 0.8, 1.0))
 
 
-def test_prospects_are_said_in_one_line() -> None:
+def test_prospects_are_one_line_of_text() -> None:
     played = watch(*SUCCEEDS)
     said = prospects_text(belief(played, 6.0))
     assert said.startswith("next: `captured` (")

@@ -50,7 +50,7 @@ def followed(
     return beliefs
 
 
-def test_small_tasks_are_recognised_as_by_counting_all_histories() -> None:
+def test_small_tasks_are_recognised_as_by_enumerating_all_histories() -> None:
     agreed = compare(25, first=5_000)
     assert agreed.steps > 100
     assert agreed.worst <= 1e-6
@@ -90,7 +90,7 @@ def test_what_is_seen_is_seen_with_some_probability_whatever_is_going_on(
         assert DEFAULT_HMM.likelihood(kind, seen, 0.0) == pytest.approx(1.0)
 
 
-def test_what_is_unknown_changes_nothing_but_the_time() -> None:
+def test_unknown_observations_change_only_the_time() -> None:
     recogniser = hidden_filter(read(ROW))
     before = followed(recogniser, "aaa")[-1]
     unknown = {key: ActionEvidence(ActionStatus.UNKNOWN) for key in seeing()}
@@ -105,7 +105,7 @@ def test_what_is_unknown_changes_nothing_but_the_time() -> None:
 
 @LAW
 @given(st.integers(0, 10**6))
-def test_time_may_be_cut_into_steps_as_one_likes(seed: int) -> None:
+def test_the_filter_does_not_depend_on_the_division_of_time(seed: int) -> None:
     """While nothing is seen, many short steps and few longer ones come to nearly the same."""
     recogniser = hidden_filter(read(ROW), least=0.0)
     before = followed(recogniser, random.Random(seed).choice(["aaaa", "aab", "abbbc"]))[-1]
@@ -131,7 +131,7 @@ def test_a_task_is_followed_from_stage_to_stage() -> None:
     assert chance > 0.98
 
 
-def test_one_wrong_look_does_not_lead_astray() -> None:
+def test_one_wrong_observation_does_not_mislead_the_filter() -> None:
     recogniser = hidden_filter(read(ROW))
     beliefs = followed(recogniser, "aaaaaacaaabaaaaaaa")
     assert {recogniser.most_likely(b)[0] for b in beliefs[4:]} == {"one"}
@@ -150,7 +150,7 @@ def test_a_contrary_that_lasts_is_failing_and_ends_it() -> None:
     assert recogniser.success(followed(recogniser, "aaaaabbbbbccccc")[-1]) > hopes[0] > hopes[-1]
 
 
-def test_what_may_come_next_is_told_with_equal_shares() -> None:
+def test_possible_next_stages_have_equal_probability() -> None:
     task = "<t> ::= <a> (<b> | <c> <b>)\n<a> ::= a(x)\n<b> ::= b(x)\n<c> ::= c(x)"
     recogniser = hidden_filter(read(task), SURE)
     assert dict(recogniser.next_stages(recogniser.start())) == {
@@ -199,7 +199,7 @@ def taken_back(beliefs: list[HiddenPosterior]) -> list[Revision]:
     return [r for a, b in pairs for r in revisions(a.likeliest, b.likeliest, b.time)]
 
 
-def test_what_later_evidence_overturns_is_taken_back() -> None:
+def test_conclusions_that_later_evidence_contradicts_are_revised() -> None:
     task = "<t> ::= a(x) | <long> <other>\n<long> ::= b(x)\n<other> ::= c(x)"
     recogniser = hidden_filter(read("<t> ::= <one> <two>\n<one> ::= a(x)\n<two> ::= b(x)"))
     beliefs = followed(recogniser, "aaaaabbb" + "a" * 12, among="ab")
@@ -228,7 +228,7 @@ def test_a_task_that_holds_itself_within_itself_is_looked_into_no_further_than_i
     assert len(recogniser.automaton) < 3_000
 
 
-def test_places_are_bounded_and_what_is_dropped_is_accounted_for() -> None:
+def test_states_are_limited_and_the_dropped_mass_is_recorded() -> None:
     task = read("<t> ::= any order (a(x), b(x), c(x), d(x), e(x))")
     few, all_of_them = hidden_filter(task, most=40), hidden_filter(task, most=10**6, least=0.0)
     told = "aaaaaccccceeeee"
@@ -239,7 +239,7 @@ def test_places_are_bounded_and_what_is_dropped_is_accounted_for() -> None:
     assert few.most_likely(one) == all_of_them.most_likely(other)
 
 
-def test_the_truth_is_dropped_no_more_often_than_is_accounted_for() -> None:
+def test_the_truth_is_dropped_no_more_often_than_recorded() -> None:
     """Over streams that the model itself draws, with far too few places kept."""
     task = read("<t> ::= any order (a(x), b(x), c(x))")
     recogniser = hidden_filter(task, most=4)

@@ -51,7 +51,7 @@ WATCHED = "<t> ::= converging(arm, tray) for 30 s"
 SCENE = {1: ARM, 2: TRAY, 3: lambda t: WALKER(t) if t > 3 else (-100, 0, 10, 10)}
 
 
-def test_a_stranger_interrupts() -> None:
+def test_an_unknown_object_interrupts_the_task() -> None:
     found = lived(WATCHED, SCENE, NAMES, 10.0)
     assert "unexpected_object" in found.alerts
     assert found.mind.tasks[0].verdict is Verdict.INTERRUPTED
@@ -60,14 +60,14 @@ def test_a_stranger_interrupts() -> None:
 @pytest.mark.parametrize(
     "said", ["bystander person", "bystanders ignored", "bystander walker is smaller than 120 px"]
 )
-def test_a_bystander_does_not(said: str) -> None:
+def test_a_bystander_does_not_interrupt_the_task(said: str) -> None:
     found = lived(f"{said}\n{WATCHED}", SCENE, NAMES, 10.0)
     assert found.alerts == set()
     assert found.mind.tasks[0].verdict is not Verdict.INTERRUPTED
     assert found.mind.tasks[0].bystanders == (3,)
 
 
-def test_who_is_no_bystander_still_interrupts() -> None:
+def test_an_object_that_is_no_bystander_still_interrupts() -> None:
     found = lived(f"bystander dog\n{WATCHED}", SCENE, NAMES, 12.0)
     assert "unexpected_object" in found.alerts
 
@@ -92,7 +92,7 @@ def test_what_parts_of_one_machine_do_to_each_other_is_no_event() -> None:
     assert not found.mind.one_machine(1, 2)
 
 
-def test_an_alert_about_a_machine_is_told_once() -> None:
+def test_an_alert_about_a_machine_is_raised_once() -> None:
     task = TaskBelief("t", Verdict.IN_PROGRESS, machines=((1, 3),))
     with_claw, with_arm, other = (
         AlertCondition("collision_course", pair, severity, "closing")

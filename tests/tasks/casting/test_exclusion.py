@@ -57,7 +57,7 @@ KNOWN = sized(1, PART, 900.0)
         ({2: 80.0}, (KNOWN, STRANGER, sized(3, {"gripper": 0.5}, 10.0)), (3, False)),
     ],
 )
-def test_who_is_guessed(
+def test_unidentified_actors_are_guessed(
     speeds: Mapping[int, float], objects: tuple[ObjectBelief, ...], gripper: tuple[int | None, bool]
 ) -> None:
     found = who(match(TASK, mind_of(speeds, *objects)))

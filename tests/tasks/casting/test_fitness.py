@@ -164,7 +164,7 @@ def test_a_part_hangs_together_with_its_machine() -> None:
     assert bound("actor claw is part of arm", paths, None, 3.0, names, "claw arm") == [3, 1]
 
 
-def test_the_operators_word_makes_an_object_an_actor_and_no_other() -> None:
+def test_an_answer_of_the_operator_binds_exactly_that_object() -> None:
     task = parse_task("actor a is red\nactor b is another red\n<t> ::= seen(a) seen(b)")
     said = Mind(objects={i: belief(i, {}) for i in (1, 2)}, answers={2: "a"})
     assert [b.object_id for b in match(task, said)] == [2, None]

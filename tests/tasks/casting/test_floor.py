@@ -86,7 +86,7 @@ def test_a_zones_file_tells_the_same(tmp_path: Path) -> None:
         (FILE.replace("floor = [[0.5, 0], ", "floor = [[0.5, 0]]#"), "corners"),
     ],
 )
-def test_what_is_wrong_with_a_ground_is_told(tmp_path: Path, text: str, said: str) -> None:
+def test_errors_of_a_ground_are_reported(tmp_path: Path, text: str, said: str) -> None:
     path = tmp_path / "zones.toml"
     path.write_text(text, "utf-8")
     with pytest.raises(SettingsError, match=said):

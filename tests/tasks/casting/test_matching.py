@@ -75,7 +75,7 @@ def test_an_actor_stands_for_the_users_models_then_the_tasks_then_its_own_name()
     assert match(task, mine)[1].object_id == 2
 
 
-def test_weak_and_unconfirmed_objects_play_no_one() -> None:
+def test_weak_and_unconfirmed_objects_are_not_bound() -> None:
     assert bound(match(DOCK, mind_of({"arm": 0.05}))) == {"arm": None, "satellite": None}
     timid = Mind(objects=MappingProxyType({1: belief(1, {"arm": 1.0}, confirmed=False)}))
     assert bound(match(DOCK, timid)) == {"arm": None, "satellite": None}
@@ -92,7 +92,7 @@ def test_a_binding_is_kept_through_small_changes_and_while_hidden() -> None:
     assert bound(match(DOCK, clearly, before))["arm"] == 2
 
 
-def test_an_object_that_left_keeps_its_part_until_another_takes_it() -> None:
+def test_an_object_that_left_stays_bound_until_another_takes_its_actor() -> None:
     before = match(DOCK, mind_of({"arm": 0.9}))
     gone = mind_of().with_objects(belief(1, {"arm": 0.9}, Presence.LEFT))
     assert bound(match(DOCK, gone, before))["arm"] == 1

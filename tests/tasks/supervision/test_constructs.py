@@ -96,7 +96,7 @@ def test_nothing_counts_for_or_against_a_first_stage_before_it_begins() -> None:
     )
 
 
-def test_what_counts_as_failure_stands_in_place_of_the_contrary() -> None:
+def test_a_fails_when_condition_replaces_the_default_failure() -> None:
     text = "<t> ::= converging(arm, satellite) fails when touching(arm, satellite) for 1 s"
     parting = Script((RelationSpan("diverging", 1.0, 30.0),))
     assert status(watch(text, parting, 10.0), "t") not in (Status.FAILING, Status.FAILED)
@@ -107,7 +107,7 @@ def test_what_counts_as_failure_stands_in_place_of_the_contrary() -> None:
     assert 5.9 <= first(played, "stage_failing", "t") <= 6.8
 
 
-def test_what_counts_as_progress_stands_in_place_of_the_usual() -> None:
+def test_a_progress_condition_replaces_the_default_progress() -> None:
     text = "<t> ::= coupled(arm, satellite){}"
     script = Script((RelationSpan("converging", 0.5, 30.0),))
     assert status(watch(text.format(""), script, 10.0), "t") is Status.PROGRESSING
@@ -125,7 +125,7 @@ def test_what_counts_as_progress_stands_in_place_of_the_usual() -> None:
         ("not (coupled(arm, satellite) or not touching(arm, satellite))", True),
     ],
 )
-def test_conditions_are_read_as_they_are_written(condition: str, true: bool) -> None:
+def test_conditions_survive_parsing(condition: str, true: bool) -> None:
     text = f"<t> ::= keeping_distance(arm, satellite)\nnever {condition}"
     script = Script(
         (RelationSpan("keeping_distance", 0.0, 30.0), RelationSpan("touching", 0.0, 30.0))
@@ -311,7 +311,7 @@ TOLD = """<dock> ::= "The arm catches the satellite" <capture>
 <caught> ::= coupled(arm, satellite)"""
 
 
-def test_the_texts_of_a_file_are_told_when_their_stages_begin() -> None:
+def test_texts_of_a_file_are_reported_when_their_stages_begin() -> None:
     played = watch(TOLD, Script((NEARS, MEETS, HOLDS)), 15.0)
     started = [e.text for e in played.events if e.kind == "stage_started"]
     assert started[0].endswith(

@@ -70,7 +70,7 @@ def test_a_delay_of_the_first_stage_counts_from_the_beginning(begins: float, goo
         (17.0, "`rinse` should begin no later than 10 s after the stage before it, but did not"),
     ],
 )
-def test_why_it_fails_is_told(begins: float, why: str) -> None:
+def test_the_reason_of_a_failure_is_reported(begins: float, why: str) -> None:
     assert any(why in e.text for e in washed("after 5 s to 10 s", begins).events)
 
 

@@ -130,7 +130,7 @@ def test_verdicts_of_the_language(name: str) -> None:
     assert finish(task_of(watch(script, until, text))) is verdict
 
 
-def test_a_broken_invariant_is_told_as_a_grave_concern() -> None:
+def test_a_broken_invariant_is_a_severe_alert_condition() -> None:
     text, script, _ = CASES["something that must never be"]
     played = watch(script, 12.0, text)
     event = next(e for e in played.events if e.kind == "invariant_broken")

@@ -56,7 +56,7 @@ def belief(played: ScriptedRun, time: float) -> TaskBelief:
 @pytest.mark.parametrize(
     ("relation", "lasts_s"), [("touching", 2.0), ("touching", 99.0), ("coupled", 2.0)]
 )
-def test_a_stage_that_is_done_is_told_so_in_whatever_order(
+def test_done_stages_are_reported_in_any_order(
     of: tuple[int, ...], relation: str, lasts_s: float
 ) -> None:
     count = len(of)

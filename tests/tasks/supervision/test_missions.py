@@ -109,7 +109,7 @@ def _stage_and_outcome(belief: TaskBelief) -> tuple[str, str]:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_failing_stage_is_told_soon(name: str) -> None:
+def test_a_failing_stage_is_reported_soon(name: str) -> None:
     wanted = [a["from_s"] for a in truth_of(name)["alerts"] if a["kind"] == "stage_failing"]
     told = [e.time for e in run(name).events if e.kind == "stage_failing"]
     if wanted:

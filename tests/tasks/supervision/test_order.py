@@ -59,7 +59,7 @@ def told_early(played: ScriptedRun, since: float) -> list[str]:
     return [str(e.data["stage"]) for e in events if "before the turn of" in e.text]
 
 
-def test_the_last_part_that_is_put_on_first_is_told_at_once() -> None:
+def test_a_step_out_of_order_is_reported_at_once() -> None:
     played = watched(THREE.format("", ""), scene((4, 4.0)), 12.0)
     assert told_early(played, 4.0) == ["a"]
     assert finish(task_of(played)) is Verdict.FAILED
@@ -75,7 +75,7 @@ def test_the_last_part_that_is_put_on_first_is_told_at_once() -> None:
         (("", ""), {k: v for k, v in HERE.items() if k != LEGS[0]}),  # nobody knows about the first
     ],
 )
-def test_what_may_be_so_is_not_told_to_be_out_of_order(
+def test_uncertain_steps_are_not_reported_as_out_of_order(
     extra: tuple[str, str], here: dict[int, tuple[float, float]]
 ) -> None:
     script = replace(scene((4, 4.0)), objects=here)

@@ -145,7 +145,7 @@ def test_a_time_limit_around_more_than_is_paused_goes_on(inside: bool) -> None:
     assert (finish(task_of(played)) is Verdict.SUCCEEDED) == inside
 
 
-def test_a_pause_and_its_end_are_told() -> None:
+def test_a_pause_and_its_end_are_reported() -> None:
     played = watched(f"for 6 s {PAUSE}", TOUCH, paused_for(3.8, 5.4), AGAIN, LIFT)
     told = [
         (e.time, e.kind, e.text)

@@ -86,7 +86,7 @@ def test_after_the_name_the_hypotheses_are_those_of_an_early_name(late: float) -
     assert early.likeliest.past[0].stage == other.likeliest.past[0].stage == "approach"
 
 
-def test_what_is_kept_is_bounded_and_let_go() -> None:
+def test_stored_observations_are_limited_and_released() -> None:
     waiting = lived({ARM: 0.0}, GOOD, 70.0).recall(MEMORY)[0]
     assert len(waiting.past_steps) <= MEMORY_S / EVERY_S + 2
     assert all(not look.mind.tasks for look in waiting.past_steps)

@@ -96,7 +96,7 @@ def test_it_goes_on_until_what_comes_next_begins() -> None:
     assert finish(task_of(played)) is Verdict.SUCCEEDED
 
 
-def test_that_it_is_out_of_time_is_told_and_that_it_recovers() -> None:
+def test_missed_times_and_recoveries_are_reported() -> None:
     played = wiped((1.0, 4.0, 10.4, 13.0, 15.8), 18.0)
     told = [e.text for e in played.events if e.kind == "stage_failing"]
     assert told == [

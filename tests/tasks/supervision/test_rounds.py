@@ -126,7 +126,7 @@ def test_rounds_that_may_come_are_one_prospect_while_their_parts_are_not_there()
     assert rounds == ["take(part_2)"]
 
 
-def test_a_run_that_is_taken_up_again_in_a_round_goes_on_as_if_it_had_not_been_left() -> None:
+def test_a_run_resumed_within_a_round_continues_unchanged() -> None:
     script, whole = emptied((1, 0)), watched(loop(), emptied((1, 0)), 2)
     reasoner = task_reasoner([parse_task(loop())])
     at = next(i for i, m in enumerate(whole.minds) if m.time >= 4.0)

@@ -133,7 +133,7 @@ TELLINGS = st.lists(st.tuples(st.permutations(PAIR), RELATIONS, st.floats(0, 9))
 
 
 @given(TELLINGS, RELATIONS, st.floats(0, 9))
-def test_no_two_that_exclude_each_other_are_told_for_the_same_time(
+def test_exclusive_relations_are_not_reported_for_the_same_time(
     tellings: list[tuple[list[str], str, float]], relation: str, since: float
 ) -> None:
     told = merged_reports(with_reported((), who, what, until) for who, what, until in tellings)

@@ -82,7 +82,7 @@ def test_tasks_with_the_same_beginning_are_both_told_of_until_they_differ() -> N
     assert belief(played, "inspect").active < REPORTABLE
 
 
-def test_a_task_that_is_not_going_on_is_not_told_to_fail() -> None:
+def test_an_inactive_task_is_not_reported_as_failing() -> None:
     for spans in (DOCKS, INSPECTS, PARTS):
         played = watch(spans)
         failing = [e.text for e in played.events if e.kind in ("stage_failing", "stage_failed")]
@@ -98,7 +98,7 @@ def test_what_was_told_to_fail_stays_told_though_another_task_begins() -> None:
     assert told == ["captured"]
 
 
-def test_before_anything_is_seen_no_task_is_told_of() -> None:
+def test_before_any_observation_no_task_is_reported() -> None:
     played = watch((), 10.0)
     assert {t.verdict for t in played.last.tasks} == {Verdict.UNKNOWN}
     assert {s.status for t in played.last.tasks for s in t.stages} == {Status.PENDING}
@@ -112,7 +112,7 @@ def test_what_may_be_asked_for_is_expected_and_what_is_out_of_the_question_is_no
     assert "diverging" not in expected
 
 
-def test_that_a_task_is_recognised_and_set_aside_is_told() -> None:
+def test_recognition_and_rejection_of_a_task_are_reported() -> None:
     played = watch(DOCKS)
     told = [(e.kind, e.data["task"]) for e in played.events if e.kind.startswith("task_")]
     assert ("task_active", "dock") in told

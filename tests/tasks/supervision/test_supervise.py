@@ -75,7 +75,7 @@ def test_capture_succeeds() -> None:
     assert task_of(played, 10.0).verdict is Verdict.IN_PROGRESS
 
 
-def test_what_was_told_complete_and_is_not_is_told_so() -> None:
+def test_a_stage_wrongly_reported_complete_is_revised() -> None:
     let_go = RelationSpan("coupled", 13.0, 15.0), RelationSpan("moving_together", 12.6, 15.0)
     played = watch(
         Script(
@@ -299,7 +299,7 @@ def watched(name: str) -> ScriptedRun:
 
 @settings(max_examples=15, deadline=None)
 @given(st.sampled_from(sorted(SCENES)), st.floats(0.0, 20.0))
-def test_shifting_a_scene_in_time_shifts_its_story(name: str, shift: float) -> None:
+def test_shifting_a_scene_in_time_shifts_its_events(name: str, shift: float) -> None:
     spans, until = SCENES[name]
     shift = round(shift, 1)
     moved = tuple(replace(s, from_s=s.from_s + shift, to_s=s.to_s + shift) for s in spans)
@@ -313,12 +313,12 @@ def test_shifting_a_scene_in_time_shifts_its_story(name: str, shift: float) -> N
 
 @pytest.mark.parametrize("fps", [4.0, 10.0, 25.0])
 @pytest.mark.parametrize("name", sorted(SCENES))
-def test_the_story_does_not_hang_on_the_frame_rate(name: str, fps: float) -> None:
+def test_events_do_not_depend_on_the_frame_rate(name: str, fps: float) -> None:
     spans, until = SCENES[name]
     assert watch(Script(spans), until, fps=fps).reported() == watched(name).reported()
 
 
-def test_a_reasoner_is_a_pure_function_and_keeps_nothing_to_itself() -> None:
+def test_a_reasoner_is_a_pure_function_without_state() -> None:
     reasoner = task_reasoner([DOCK])
     played = play(reasoner, Script(FAILS), 20.0)
     again = play(reasoner, Script(FAILS), 20.0)
@@ -334,7 +334,7 @@ def test_several_tasks_are_supervised_side_by_side() -> None:
 
 
 @pytest.mark.parametrize("share", [0.05, 0.1])
-def test_now_and_then_wrong_relations_do_not_change_the_verdict(share: float) -> None:
+def test_occasionally_wrong_relations_do_not_change_the_verdict(share: float) -> None:
     for seed in range(4):
         for name, (spans, until) in SCENES.items():
             noisy = _with_noise(spans, until, share, seed)

@@ -101,7 +101,7 @@ def test_tasks_without_a_common_object_do_not_compete() -> None:
     assert all(a.chance > SURE for a in now)
 
 
-def test_rivals_of_a_task_that_ended_begin_anew() -> None:
+def test_rivals_of_a_task_that_ended_start_again() -> None:
     now: tuple[TaskActivity, ...] = (TaskActivity(MOST, 0.5, True), TaskActivity(MOST, 0.5, True))
     now = updated_activities(now, [0.0, -0.1], [ONE, ONE], 0.1, [True, False])
     assert now[0].ended

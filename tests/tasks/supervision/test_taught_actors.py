@@ -48,7 +48,7 @@ def database(tmp_path: Path) -> ModelDatabase:
         ),
     ],
 )
-def test_an_actor_is_what_was_taught_unless_somebody_says_otherwise(
+def test_an_actor_is_the_taught_object_of_its_name_by_default(
     database: ModelDatabase,
     tmp_path: Path,
     declared: str,
