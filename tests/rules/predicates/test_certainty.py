@@ -127,23 +127,21 @@ def test_what_was_whole_when_the_video_began_did_not_come_in(x: float, comes: bo
 
 
 def links(hand_speed: float, link_speed: float, gap: float) -> Mind:
-    """A hand (1), which is an actor, a link (2) beside it, and one (3) beside that; pixels per second."""
-    size = 80.0
+    """A hand (1), which is an actor, a link (2) beside it in the end, and one (3) beside that; pixels/s."""
+    size, frames, fps = 80.0, 30, 25
+    beside = 160.0 + size + gap
 
-    def boxes(t: float) -> list[Rect]:
-        x = 120.0 + link_speed * t
-        second, third = (
-            (x + size + gap, 200.0, size, size),
-            (x + 2 * (size + gap), 200.0, size, size),
-        )
-        return [(120.0 + hand_speed * t, 200.0, size, size), second, third]
+    def boxes(before_end: float) -> list[Rect]:
+        link = beside - link_speed * before_end
+        starts = (160.0 - hand_speed * before_end, link, link + size + gap)
+        return [(x, 200.0, size, size) for x in starts]
 
-    frames = (
-        seen(i, [box_region(n + 1, b) for n, b in enumerate(boxes(i / 25))]) for i in range(30)
+    times = [(frames - 1 - i) / fps for i in range(frames)]
+    steps = (
+        seen(i, [box_region(n + 1, b) for n, b in enumerate(boxes(t))]) for i, t in enumerate(times)
     )
-    mind = reason(frames)[-1].mind
     task = TaskBelief("t", Verdict.IN_PROGRESS, bindings=(Binding("hand", ("hand",), 1),))
-    return replace(mind, tasks=(task,))
+    return replace(reason(steps)[-1].mind, tasks=(task,))
 
 
 @pytest.mark.parametrize(
