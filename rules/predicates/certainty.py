@@ -106,9 +106,10 @@ def _reached(near: NDArray[np.bool_], start: NDArray[np.bool_]) -> NDArray[np.bo
         near: (N, N) bool, whether each object is reached from each other one.
         start: (N,) bool, the first objects.
     """
-    reached = start
-    for _ in range(len(start)):
-        reached = reached | near[:, reached].any(axis=1)
+    reached, further = start, start
+    while further.any():
+        further = near[:, further].any(axis=1) & ~reached
+        reached = reached | further
     return reached
 
 

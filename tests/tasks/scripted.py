@@ -224,3 +224,15 @@ def watch(script: Script, until: float, text: str = "", fps: float = FPS) -> Scr
 def task_of(played: ScriptedRun, time: float | None = None) -> TaskBelief:
     """What is believed of the only task, at the end or at a time."""
     return (played.last if time is None else played.at(time)).tasks[0]
+
+
+RETRIES = (
+    RelationSpan("converging", 0, 5),
+    RelationSpan("diverging", 6, 10),
+    RelationSpan("converging", 11, 15),
+    RelationSpan("diverging", 16, 18),
+    RelationSpan("converging", 19, 25),
+    RelationSpan("touching", 25, 40),
+    RelationSpan("coupled", 26, 40),
+)
+"""Two attempts at a capture that are broken off, and a third one that succeeds."""

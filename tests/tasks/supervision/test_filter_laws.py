@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import pytest
 
 from tests.rules.percepts_from_truth import MISSIONS
-from tests.tasks.scripted import RelationSpan, Script, play
+from tests.tasks.scripted import RETRIES, RelationSpan, Script, play
 from tests.tasks.supervision.test_missions import NAMES, run
 from visup.agent import Mind
 from visup.evaluation.reasoning.filter_laws import (
@@ -34,15 +34,6 @@ FAILS = (
     RelationSpan("converging", 0.5, 12.3),
     RelationSpan("touching", 12.0, 12.8),
     RelationSpan("diverging", 12.8, 30),
-)
-RETRIES = (
-    RelationSpan("converging", 0, 5),
-    RelationSpan("diverging", 6, 10),
-    RelationSpan("converging", 11, 15),
-    RelationSpan("diverging", 16, 18),
-    RelationSpan("converging", 19, 25),
-    RelationSpan("touching", 25, 40),
-    RelationSpan("coupled", 26, 40),
 )
 ORDERS = """<t> ::= any order (<s0>, <s1>, <s2>)
 <s0> ::= touching(arm, satellite)

@@ -12,6 +12,7 @@ from tests.tasks.scripted import (
     ARM,
     DOCK,
     INTRUDER,
+    RETRIES,
     SATELLITE,
     RelationSpan,
     Script,
@@ -253,24 +254,15 @@ def test_what_the_stage_asks_for_is_expected_and_so_is_the_entry_to_the_next() -
 
 
 RETRY = load_task("dock_with_retry")
-TWICE = (
-    RelationSpan("converging", 0, 5),
-    RelationSpan("diverging", 6, 10),
-    RelationSpan("converging", 11, 15),
-    RelationSpan("diverging", 16, 18),
-    RelationSpan("converging", 19, 25),
-    RelationSpan("touching", 25, 40),
-    RelationSpan("coupled", 26, 40),
-)
 
 
 def test_a_task_that_allows_a_retry_takes_a_retreat_for_one() -> None:
-    played = play(task_reasoner([RETRY]), Script(TWICE), 30.0)
+    played = play(task_reasoner([RETRY]), Script(RETRIES), 30.0)
     assert task_of(played).verdict is Verdict.SUCCEEDED
     assert "stage_failing" not in dict(played.reported())
     assert task_of(played, 8.0).current == "back_off"
     assert task_of(played, 14.0).current == "approach"
-    assert finish(task_of(watch(Script(TWICE), 20.0))) is not Verdict.SUCCEEDED
+    assert finish(task_of(watch(Script(RETRIES), 20.0))) is not Verdict.SUCCEEDED
 
 
 def test_an_actor_does_not_change_hands_in_a_moment() -> None:
@@ -328,7 +320,7 @@ def test_a_reasoner_is_a_pure_function_without_state() -> None:
 
 
 def test_several_tasks_are_supervised_side_by_side() -> None:
-    played = play(task_reasoner([DOCK, RETRY]), Script(TWICE), 30.0)
+    played = play(task_reasoner([DOCK, RETRY]), Script(RETRIES), 30.0)
     assert [t.task for t in played.last.tasks] == ["dock", "dock_with_retry"]
     assert played.last.tasks[1].verdict is Verdict.SUCCEEDED
 
