@@ -1,4 +1,4 @@
-"""What a user does on the console's pages: open, press, choose; and what axe-core finds wrong with them."""
+"""Actions on the pages of the console in a browser, and their accessibility as axe-core checks it."""
 
 from __future__ import annotations
 
@@ -7,24 +7,24 @@ from importlib.resources import files
 from tests.console.running import OPERATOR
 from tests.teaching.browser import Browser
 
-LISTEN = (
+RECORD_ERRORS = (
     "window.troubles = []; window.onerror = (m) => window.troubles.push(String(m));"
     "console.error = (...m) => window.troubles.push(m.join(' '));"
 )
 
 
-def enter(browser: Browser, address: str, token: str = OPERATOR) -> None:
-    browser.call("Page.addScriptToEvaluateOnNewDocument", source=LISTEN)
+def sign_in(browser: Browser, address: str, token: str = OPERATOR) -> None:
+    browser.call("Page.addScriptToEvaluateOnNewDocument", source=RECORD_ERRORS)
     browser.open(f"{address}?token={token}")
 
 
 def open_run(browser: Browser, address: str, token: str = OPERATOR, name: str = "evening") -> None:
-    enter(browser, address, token)
+    sign_in(browser, address, token)
     browser.until("document.querySelectorAll('.runs tbody a').length == 4")
-    follow(browser, name)
+    open_from_list(browser, name)
 
 
-def follow(browser: Browser, name: str) -> None:
+def open_from_list(browser: Browser, name: str) -> None:
     """Open a run from the list."""
     link = f"[...document.querySelectorAll('.runs a')].find(a => a.innerText == '{name}')"
     browser.until(f"!!{link}")
@@ -32,13 +32,13 @@ def follow(browser: Browser, name: str) -> None:
     browser.until("document.querySelector('img.picture')?.naturalWidth > 0")
 
 
-def tab(browser: Browser, name: str) -> None:
+def open_tab(browser: Browser, name: str) -> None:
     browser.value(
         f"[...document.querySelectorAll('.q-tab')].find(t => t.innerText.trim() == '{name}').click()"
     )
 
 
-def press(browser: Browser, text: str) -> None:
+def press_button(browser: Browser, text: str) -> None:
     browser.until(
         f"[...document.querySelectorAll('button')].some(b => b.innerText.trim() == '{text}')"
     )
@@ -47,11 +47,11 @@ def press(browser: Browser, text: str) -> None:
     )
 
 
-def shows(browser: Browser, text: str) -> None:
+def wait_for_text(browser: Browser, text: str) -> None:
     browser.until(f"document.body?.innerText.includes({text!r})")
 
 
-def switch(browser: Browser, name: str) -> None:
+def toggle_checkbox(browser: Browser, name: str) -> None:
     browser.until(
         f"[...document.querySelectorAll('.q-checkbox')].some(c => c.innerText.trim() == '{name}')"
     )
@@ -60,16 +60,16 @@ def switch(browser: Browser, name: str) -> None:
     )
 
 
-def violations(browser: Browser) -> list[str]:
-    """What axe-core calls serious or critical on the page as it is."""
+def accessibility_violations(browser: Browser) -> list[str]:
+    """Serious and critical violations on the current page, from axe-core."""
     browser.until("document.getAnimations().every(a => a.playState == 'finished')")
     program = files("axe_core_python").joinpath("axe.min.js").read_text(encoding="utf-8")
     browser.value(program + "; 0")
     browser.value("window.found = null; axe.run().then(r => window.found = r.violations); 0")
     browser.until("window.found !== null")
-    grave = "window.found.filter(v => ['serious', 'critical'].includes(v.impact))"
+    severe = "window.found.filter(v => ['serious', 'critical'].includes(v.impact))"
     return list(
         browser.value(
-            f"{grave}.map(v => v.id + ': ' + v.nodes[0].html + v.nodes[0].failureSummary)"
+            f"{severe}.map(v => v.id + ': ' + v.nodes[0].html + v.nodes[0].failureSummary)"
         )
     )

@@ -1,4 +1,4 @@
-"""One console for all tests that need a real one: a process of its own, over a folder of recorded runs."""
+"""One console for all tests that need a server: in its own process, over a folder of recorded runs."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from tests.archive.recordings import meeting, record
-from tests.console.evidence_files import keep_evidence
+from tests.console.evidence_files import write_evidence
 from tests.console.running import running_console
-from tests.console.test_runs import SETTINGS, doubtful
+from tests.console.test_runs import SETTINGS, ambiguous_observations
 from tests.teaching.browser import Browser, found_browser
 from visup.api.recorded import open_run
 
@@ -19,15 +19,15 @@ SECRET = "what stands outside of the folders"
 
 @pytest.fixture(scope="package")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Recorded runs, and beside their folder what nobody may read."""
+    """Recorded runs, and next to their folder files that nobody may read."""
     folder = tmp_path_factory.mktemp("console") / "library"
     record(folder / "evening", meeting(), SETTINGS)
     record(folder / "<b>morning", meeting(30), SETTINGS)
-    record(folder / "who-is-it", doubtful(), SETTINGS)
+    record(folder / "who-is-it", ambiguous_observations(), SETTINGS)
     record(folder / "yard-run", meeting(), SETTINGS, ended=None, camera="yard")
     for name in ("evening", "yard-run"):
         for alert in open_run(folder / name).alerts:
-            keep_evidence(folder / name, alert.id)
+            write_evidence(folder / name, alert.id)
     for name in ("secret.txt", "alert-1.jpg"):
         (folder.parent / name).write_text(SECRET)
     return folder

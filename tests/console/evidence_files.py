@@ -1,4 +1,4 @@
-"""Evidence of alerts as `visup serve` leaves it beside a run."""
+"""Evidence of alerts as written by `visup serve` next to a run."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import numpy as np
 from visup.report.video import WebmWriter
 
 
-def keep_evidence(run: Path, alert: int) -> Path:
-    """A picture and a clip of an alert; gives their folder."""
+def write_evidence(run: Path, alert: int) -> Path:
+    """Write a picture and a clip of an alert; returns their folder."""
     folder = run / "evidence"
     folder.mkdir(exist_ok=True)
     image = np.full((96, 128, 3), 60, np.uint8)

@@ -1,7 +1,7 @@
-"""How quick the console is, and what it costs the agent: `python -m tests.console.pace`.
+"""Response times of the console, and its cost for the agent: `python -m tests.console.pace`.
 
 It drives a console in a real browser, over a run of two hours at ten frames a second (a scripted one of
-twelve minutes, ten times over) and a run of the shipped clip. Exit code 1 when a bar is missed.
+twelve minutes, ten times over) and a run of the shipped clip. Exit code 1 if a limit is exceeded.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ from visup.runs.settings import RunOptions
 FRAMES, TIMES, FPS = 7_200, 10, 10.0
 CLICKS = 15
 PASSES, BLOCKS, BLOCK, STEP_S = 4, 4, 25, 0.3
-"""An agent watches the same frames in passes, one each 0.3 s, in blocks without and with pages open by turns;
-every other pass begins with pages, so that each frame is seen both ways and a slow pass weighs on both."""
+"""An agent watches the same frames in passes, one each 0.3 s, in blocks alternately without and with open
+pages; every other pass begins with pages, so that each frame is measured both ways."""
 
-BARS = {"first_paint_s": 1.5, "click_ms": 150.0, "open_s": 2.0, "agent_cost": 0.05}
+LIMITS = {"first_paint_s": 1.5, "click_ms": 150.0, "open_s": 2.0, "agent_cost": 0.05}
 
-MEASURED = ("first_paint_s", "open_s", "click_ms", "click_most_ms")
+FIGURES = ("first_paint_s", "open_s", "click_ms", "click_most_ms")
 
-WATCHED = """
+CLICK_TIMER = """
 window.opened = null; window.clicked = null;
 const shown = () => {
   const p = document.querySelector('img.picture');
@@ -67,7 +67,7 @@ requestAnimationFrame(look);
 
 
 def scripted(frames: int) -> Iterator[Observation]:
-    """An arm that comes up to a satellite and goes back, again and again."""
+    """An arm that repeatedly approaches a satellite and retreats."""
     for i in range(frames):
         k = i % 120
         regions = [
@@ -79,7 +79,7 @@ def scripted(frames: int) -> Iterator[Observation]:
 
 
 def long_run(folder: Path) -> None:
-    """A run of two hours: what was recorded once is repeated in its journal."""
+    """A run of two hours: a short recording repeated in its journal."""
     record(folder, scripted(FRAMES), SETTINGS)
     with closing(sqlite3.connect(folder / JOURNAL)) as db:
         for k in range(1, TIMES):
@@ -91,9 +91,9 @@ def long_run(folder: Path) -> None:
         db.commit()
 
 
-def opened(browser: Browser, address: str, name: str) -> float:
-    """Open a run from the list; seconds until its first picture is there."""
-    browser.call("Page.addScriptToEvaluateOnNewDocument", source=WATCHED)
+def opening_time(browser: Browser, address: str, name: str) -> float:
+    """Open a run from the list; seconds until its first picture is loaded."""
+    browser.call("Page.addScriptToEvaluateOnNewDocument", source=CLICK_TIMER)
     browser.open(f"{address}?token={OPERATOR}")
     link = f"[...document.querySelectorAll('.runs a')].find(a => a.innerText == '{name}')"
     browser.until(f"!!{link}")
@@ -103,16 +103,16 @@ def opened(browser: Browser, address: str, name: str) -> float:
 
 
 def first_paint(browser: Browser) -> float:
-    """Seconds until the page that is open had something to show."""
+    """Seconds until the first contentful paint of the open page."""
     browser.until("performance.getEntriesByName('first-contentful-paint').length > 0")
     return float(
         browser.value("performance.getEntriesByName('first-contentful-paint')[0].startTime / 1000")
     )
 
 
-def clicks(browser: Browser) -> list[float]:
-    """Milliseconds from clicks on the timeline until frame and belief are there."""
-    took = []
+def click_times(browser: Browser) -> list[float]:
+    """Milliseconds from clicks on the timeline until frame and beliefs are updated."""
+    durations = []
     for k in range(CLICKS):
         x, y, w = browser.value(
             "(() => { const r = document.querySelector('.bars').getBoundingClientRect();"
@@ -120,8 +120,8 @@ def clicks(browser: Browser) -> list[float]:
         )
         browser.click(x + w * (0.05 + 0.9 * ((7 * k) % CLICKS) / CLICKS), y + 8)
         browser.until("window.clicked && window.clicked.end !== null")
-        took.append(float(browser.value("window.clicked.end - window.clicked.begin")))
-    return took
+        durations.append(float(browser.value("window.clicked.end - window.clicked.begin")))
+    return durations
 
 
 def follow(browser: Browser, address: str, name: str) -> None:
@@ -138,7 +138,7 @@ def step_times(scratch: Path, address: str, folder: Path, first: int) -> list[fl
     """Seconds of each step of an agent; blocks of odd number, counted from `first`, with three pages open."""
     folder.mkdir()
     run = supervised(demo_settings(), folder, Audience(), RunOptions(video=False, report=False))
-    took = []
+    durations = []
     with ExitStack() as stack:
         stack.callback(run.close)
         next(run)
@@ -150,17 +150,17 @@ def step_times(scratch: Path, address: str, folder: Path, first: int) -> list[fl
                 for _ in range(BLOCK):
                     begin = time.perf_counter()
                     next(run)
-                    took.append(time.perf_counter() - begin)
-                    time.sleep(max(0.0, STEP_S - took[-1]))
-    return took
+                    durations.append(time.perf_counter() - begin)
+                    time.sleep(max(0.0, STEP_S - durations[-1]))
+    return durations
 
 
 def agent_cost(scratch: Path, address: str, library: Path) -> tuple[float, float]:
     """Share that three open pages add to a step, on the same frames, and its standard error."""
-    took = np.array(
+    durations = np.array(
         [step_times(scratch, address, library / f"live-{p}", p % 2) for p in range(PASSES)]
     )
-    logs = np.log(took).reshape(PASSES, BLOCKS, BLOCK)
+    logs = np.log(durations).reshape(PASSES, BLOCKS, BLOCK)
     pages = (np.arange(PASSES)[:, None] + np.arange(BLOCKS)) % 2 == 1
     added = np.array(
         [logs[pages[:, b], b].mean(0) - logs[~pages[:, b], b].mean(0) for b in range(BLOCKS)]
@@ -171,7 +171,7 @@ def agent_cost(scratch: Path, address: str, library: Path) -> tuple[float, float
 
 
 def main() -> int:
-    """Measure, and say it as JSON; where there is no browser, say that."""
+    """Measure, and print the figures as JSON; without a browser, print the reason."""
     try:
         found_browser()
     except pytest.skip.Exception as why:
@@ -182,23 +182,23 @@ def main() -> int:
         library, saved = scratch / "library", scratch / "saved"
         saved.mkdir()
         long_run(library / "long")
-        supervise(demo_settings(6), _made(library / "short"), options=RunOptions(video=False))
+        supervise(demo_settings(6), _new_folder(library / "short"), options=RunOptions(video=False))
         with running_console(library, saved) as address:
             with Browser(scratch / "profile", (1280, 860)) as browser:
-                told: dict[str, list[float]] = {name: [] for name in MEASURED}
+                figures: dict[str, list[float]] = {name: [] for name in FIGURES}
                 for run in ("short", "long"):
-                    told["open_s"].append(round(opened(browser, address, run), 2))
-                    told["first_paint_s"].append(round(first_paint(browser), 2))
-                    took = clicks(browser)
-                    told["click_ms"].append(round(median(took)))
-                    told["click_most_ms"].append(round(max(took)))
+                    figures["open_s"].append(round(opening_time(browser, address, run), 2))
+                    figures["first_paint_s"].append(round(first_paint(browser), 2))
+                    durations = click_times(browser)
+                    figures["click_ms"].append(round(median(durations)))
+                    figures["click_most_ms"].append(round(max(durations)))
             cost, error = agent_cost(scratch, address, library)
-            told["agent_cost"], told["agent_cost_error"] = [round(cost, 3)], [round(error, 3)]
-    print(json.dumps(told))
-    return int(any(max(told[name]) > bar for name, bar in BARS.items()))
+            figures["agent_cost"], figures["agent_cost_error"] = [round(cost, 3)], [round(error, 3)]
+    print(json.dumps(figures))
+    return int(any(max(figures[name]) > limit for name, limit in LIMITS.items()))
 
 
-def _made(folder: Path) -> Path:
+def _new_folder(folder: Path) -> Path:
     folder.mkdir(parents=True)
     return folder
 

@@ -1,4 +1,4 @@
-"""A console in a process of its own, over a folder of runs."""
+"""A console in its own process, over a folder of runs."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ OPERATOR, VIEWER = "operator-token-of-this-test", "viewer-token-of-this-test"
 
 @contextmanager
 def running_console(folder: Path, saved: Path) -> Iterator[str]:
-    """The address of a console, ending in a slash; whatever is asked of it, it never fails inside.
+    """The address of a console, ending in a slash; fails if it prints a traceback.
 
     Args:
-        folder: Of recorded runs.
-        saved: An empty folder for what operators save; what it says of trouble is kept beside it.
+        folder: Folder of recorded runs.
+        saved: Empty folder for texts saved by operators; the log of errors is written next to it.
     """
-    told = saved.parent / "stderr"
+    log = saved.parent / "stderr"
     tokens = {"VISUP_CONSOLE_TOKEN": OPERATOR, "VISUP_CONSOLE_VIEWER_TOKEN": VIEWER}
     command = [sys.executable, "-m", "visup.cli", "console", str(folder), "--port", "0"]
     with (
-        told.open("w") as errors,
+        log.open("w") as errors,
         subprocess.Popen(
             [*command, "--save-to", str(saved)],
             stdout=subprocess.PIPE,
@@ -35,7 +35,7 @@ def running_console(folder: Path, saved: Path) -> Iterator[str]:
     ):
         assert process.stdout is not None
         line = process.stdout.readline()
-        assert "token=" in line, told.read_text()
+        assert "token=" in line, log.read_text()
         yield line.split()[-1].partition("?")[0]
         process.terminate()
-    assert "Traceback" not in told.read_text(), told.read_text()[-3000:]
+    assert "Traceback" not in log.read_text(), log.read_text()[-3000:]

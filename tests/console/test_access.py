@@ -1,4 +1,4 @@
-"""Who gets in: names, origins, tokens, sockets."""
+"""Access control: host names, origins, tokens, sockets."""
 
 from __future__ import annotations
 
@@ -9,22 +9,31 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from visup.console.access import COOKIE, WHO, Access, AccessGuard, Message, Receive, Scope, Send
+from visup.console.access import (
+    COOKIE,
+    ROLE_KEY,
+    Access,
+    AccessGuard,
+    Message,
+    Receive,
+    Scope,
+    Send,
+)
 
 ACCESS = Access(
     "operator-token-of-test", "viewer-token-of-a-test", ("127.0.0.1", "console.example")
 )
 
 
-def asked(
+def request(
     headers: dict[str, str], query: str = "", kind: str = "http"
 ) -> tuple[list[Message], str | None]:
-    """What is sent, and the role with which the application behind was reached, or None."""
+    """The messages sent, and the role passed to the application, or None."""
     sent: list[Message] = []
     reached: list[str] = []
 
     async def app(scope: Scope, receive: Receive, send: Send) -> None:
-        reached.append(str(scope[WHO]))
+        reached.append(str(scope[ROLE_KEY]))
 
     async def send(message: Message) -> None:
         sent.append(message)
@@ -43,48 +52,50 @@ def asked(
 
 
 HOST = {"host": "127.0.0.1:8086"}
-MINE = {**HOST, "cookie": f"{COOKIE}={ACCESS.operator}"}
+OPERATOR_HEADERS = {**HOST, "cookie": f"{COOKIE}={ACCESS.operator}"}
 
 
 @pytest.mark.parametrize("kind", ["http", "websocket"])
 @pytest.mark.parametrize(
     ("headers", "role"),
     [
-        (MINE, "operator"),
+        (OPERATOR_HEADERS, "operator"),
         ({**HOST, "cookie": f"a=b; {COOKIE}={ACCESS.viewer}"}, "viewer"),
-        ({**MINE, "origin": "http://127.0.0.1:8086"}, "operator"),
-        ({**MINE, "host": "console.example"}, "operator"),
-        ({**MINE, "origin": "http://127.0.0.1:9"}, None),
-        ({**MINE, "origin": "http://evil.example"}, None),
-        ({**MINE, "origin": "null"}, None),
-        ({**MINE, "host": "evil.example:8086"}, None),
-        ({**MINE, "host": ""}, None),
-        ({**MINE, "content-length": "9999999"}, None),
-        ({**MINE, "content-length": "-1"}, None),
+        ({**OPERATOR_HEADERS, "origin": "http://127.0.0.1:8086"}, "operator"),
+        ({**OPERATOR_HEADERS, "host": "console.example"}, "operator"),
+        ({**OPERATOR_HEADERS, "origin": "http://127.0.0.1:9"}, None),
+        ({**OPERATOR_HEADERS, "origin": "http://evil.example"}, None),
+        ({**OPERATOR_HEADERS, "origin": "null"}, None),
+        ({**OPERATOR_HEADERS, "host": "evil.example:8086"}, None),
+        ({**OPERATOR_HEADERS, "host": ""}, None),
+        ({**OPERATOR_HEADERS, "content-length": "9999999"}, None),
+        ({**OPERATOR_HEADERS, "content-length": "-1"}, None),
         (HOST, None),
         ({**HOST, "cookie": f"{COOKIE}="}, None),
         ({**HOST, "cookie": f"{COOKIE}=operator-token-of-tes"}, None),
     ],
 )
-def test_who_is_let_in(headers: dict[str, str], role: str | None, kind: str) -> None:
-    sent, reached = asked(headers, kind=kind)
+def test_host_origin_token_and_length_decide_who_gets_in(
+    headers: dict[str, str], role: str | None, kind: str
+) -> None:
+    sent, reached = request(headers, kind=kind)
     assert reached == role
     if role is None:
         first = sent[0]
         assert first.get("status") == 403 or first["type"] == "websocket.close"
 
 
-def test_who_is_not_let_in_is_told_in_a_page_or_in_words() -> None:
-    page, _ = asked({**HOST, "accept": "text/html,*/*"})
-    words, _ = asked({**HOST, "accept": "*/*"})
+def test_refusals_are_pages_for_browsers_and_plain_text_for_others() -> None:
+    page, _ = request({**HOST, "accept": "text/html,*/*"})
+    plain, _ = request({**HOST, "accept": "*/*"})
     assert b"<h1>This console is closed to you</h1>" in page[1]["body"]
-    assert words[1]["body"].startswith(b"Open it by the address")
-    for told in (page, words):
-        assert b"script" not in told[1]["body"]
+    assert plain[1]["body"].startswith(b"Open it by the address")
+    for messages in (page, plain):
+        assert b"script" not in messages[1]["body"]
 
 
-def test_the_token_goes_from_the_address_into_a_cookie_that_scripts_cannot_read() -> None:
-    sent, reached = asked(HOST, f"token={ACCESS.operator}")
+def test_the_token_moves_from_the_address_to_a_cookie_hidden_from_scripts() -> None:
+    sent, reached = request(HOST, f"token={ACCESS.operator}")
     headers = dict(sent[0]["headers"])
     assert (reached, sent[0]["status"]) == (None, 303)
     assert headers[b"location"] == b"/run/1"
@@ -96,11 +107,11 @@ def test_the_token_goes_from_the_address_into_a_cookie_that_scripts_cannot_read(
     st.text(alphabet=st.characters(max_codepoint=255), max_size=60),
     st.sampled_from(["cookie", "host"]),
 )
-def test_nothing_else_gets_in(text: str, name: str) -> None:
-    _, reached = asked({**HOST, name: text.replace("\n", " ").replace("\r", " ")})
+def test_no_other_cookie_or_host_gets_in(text: str, name: str) -> None:
+    _, reached = request({**HOST, name: text.replace("\n", " ").replace("\r", " ")})
     assert reached is None
 
 
-def test_two_consoles_have_two_tokens() -> None:
+def test_each_console_has_its_own_token() -> None:
     assert Access().operator != Access().operator
     assert Access().role("") is None

@@ -1,4 +1,4 @@
-"""Evidence of alerts: found by number, within the run, and only what was noted."""
+"""Evidence of alerts is found by number, and only within the run."""
 
 from __future__ import annotations
 
@@ -8,35 +8,35 @@ from pathlib import Path
 import pytest
 
 from tests.archive.recordings import meeting, record
-from tests.console.evidence_files import keep_evidence
+from tests.console.evidence_files import write_evidence
 from tests.console.test_runs import SETTINGS
 from visup.console.evidence import AlertEvidence, evidence_of, latest_snapshot
-from visup.console.feedback import Opinion, say
+from visup.console.feedback import Opinion, store_feedback
 from visup.console.library import RunLibrary
 from visup.console.pages.wall_alerts import AlertFilter, alert_rows
 from visup.console.state import ConsoleState
 
 
-def test_a_picture_and_a_clip_are_found_by_the_number_of_their_alert(tmp_path: Path) -> None:
+def test_picture_and_clip_are_found_by_the_number_of_the_alert(tmp_path: Path) -> None:
     assert not evidence_of(tmp_path, 1)
     assert latest_snapshot(tmp_path) is None
-    folder = keep_evidence(tmp_path, 7)
+    folder = write_evidence(tmp_path, 7)
     assert evidence_of(tmp_path, 7) == AlertEvidence(
         folder / "alert-7.jpg", folder / "alert-7.webm"
     )
     assert latest_snapshot(tmp_path) == 7
     (folder / "alert-7.webm").rename(folder / "alert-7.spool")
-    assert evidence_of(tmp_path, 7) == AlertEvidence(folder / "alert-7.jpg", awaited=True)
+    assert evidence_of(tmp_path, 7) == AlertEvidence(folder / "alert-7.jpg", clip_pending=True)
 
 
 @pytest.mark.parametrize(
     "named",
     ["../secret.jpg", "/etc/passwd", "..", "", "secret.txt", "a\0.jpg", "x" * 5000, "link.jpg"],
 )
-def test_no_file_outside_the_folder_is_ever_named(tmp_path: Path, named: str) -> None:
+def test_files_outside_the_folder_are_no_evidence(tmp_path: Path, named: str) -> None:
     run = tmp_path / "run"
     run.mkdir()
-    folder = keep_evidence(run, 1)
+    folder = write_evidence(run, 1)
     (tmp_path / "secret.jpg").write_text("secret")
     (folder / "secret.txt").write_text("secret")
     (folder / "link.jpg").symlink_to(tmp_path / "secret.jpg")
@@ -45,21 +45,21 @@ def test_no_file_outside_the_folder_is_ever_named(tmp_path: Path, named: str) ->
 
 
 @pytest.mark.parametrize("text", ["", "[]", "null", '{"clip": 3}', '{"snapshot": [], "clip": {}}'])
-def test_a_damaged_note_is_no_evidence(tmp_path: Path, text: str) -> None:
-    folder = keep_evidence(tmp_path, 1)
+def test_a_damaged_record_is_no_evidence(tmp_path: Path, text: str) -> None:
+    folder = write_evidence(tmp_path, 1)
     (folder / "alert-1.json").write_text(text)
     assert not evidence_of(tmp_path, 1)
 
 
-def test_a_folder_that_is_a_link_is_not_followed(tmp_path: Path) -> None:
+def test_a_linked_folder_is_not_followed(tmp_path: Path) -> None:
     (tmp_path / "other").mkdir()
-    keep_evidence(tmp_path / "other", 1)
+    write_evidence(tmp_path / "other", 1)
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "evidence").symlink_to(tmp_path / "other" / "evidence")
     assert not evidence_of(tmp_path / "run", 1)
 
 
-def test_the_alerts_of_all_cameras_are_filtered(tmp_path: Path) -> None:
+def test_alerts_of_all_cameras_can_be_filtered(tmp_path: Path) -> None:
     record(tmp_path / "cell", meeting(), SETTINGS)
     record(tmp_path / "yard", meeting(shift=4.0), SETTINGS)
     library = RunLibrary([tmp_path])
@@ -72,7 +72,7 @@ def test_the_alerts_of_all_cameras_are_filtered(tmp_path: Path) -> None:
     opened = alert_rows(state, entries, AlertFilter())
     assert {id(r.alert) for r in opened} == {id(r.alert) for r in every if r.alert.closed is None}
     one = every[0]
-    say(one.run.folder, one.alert, Opinion.SEEN)
+    store_feedback(one.run.folder, one.alert, Opinion.SEEN)
     left = alert_rows(state, entries, AlertFilter("unseen"))
     assert len(left) == len(every) - 1
     words = alert_rows(state, entries, AlertFilter("all", "YARD collision course"))
@@ -82,7 +82,7 @@ def test_the_alerts_of_all_cameras_are_filtered(tmp_path: Path) -> None:
     assert not alert_rows(state, entries, AlertFilter("all", "nowhere to be found"))
 
 
-def test_a_run_that_is_over_is_not_read_again(tmp_path: Path) -> None:
+def test_an_ended_run_is_not_read_again(tmp_path: Path) -> None:
     record(tmp_path / "over", meeting(10), SETTINGS)
     record(tmp_path / "going", meeting(10), SETTINGS, ended=None)
     library = RunLibrary([tmp_path])

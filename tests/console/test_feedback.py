@@ -1,4 +1,4 @@
-"""What people say of alerts is kept, and becomes precision figures."""
+"""Feedback on alerts is stored, and gives precision figures."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from visup.agent import Alert, Severity
 from visup.agent.model.errors import VisupError
 from visup.console.feedback import (
     FEEDBACK,
-    LONGEST_NOTE,
+    MAX_NOTE_LENGTH,
     AlertFeedback,
     Opinion,
     precisions,
     read_feedback,
-    say,
+    store_feedback,
 )
 
 
@@ -25,12 +25,12 @@ def alert(number: int, kind: str = "collision_course") -> Alert:
     return Alert(number, kind, Severity.WARNING, 1.0, 1.0, (1, 2), "They come near.")
 
 
-def test_the_last_word_counts_and_all_are_kept(tmp_path: Path) -> None:
-    say(tmp_path, alert(1), Opinion.RIGHT)
-    say(tmp_path, alert(2), Opinion.MUTED, "the door\n is open")
-    say(tmp_path, alert(1), Opinion.FALSE_ALARM, "a shadow")
-    said = read_feedback(tmp_path)
-    assert {n: (f.opinion, f.note) for n, f in said.items()} == {
+def test_the_last_feedback_counts_and_earlier_ones_are_kept(tmp_path: Path) -> None:
+    store_feedback(tmp_path, alert(1), Opinion.RIGHT)
+    store_feedback(tmp_path, alert(2), Opinion.MUTED, "the door\n is open")
+    store_feedback(tmp_path, alert(1), Opinion.FALSE_ALARM, "a shadow")
+    opinions = read_feedback(tmp_path)
+    assert {n: (f.opinion, f.note) for n, f in opinions.items()} == {
         1: (Opinion.FALSE_ALARM, "a shadow"),
         2: (Opinion.MUTED, "the door is open"),
     }
@@ -38,19 +38,19 @@ def test_the_last_word_counts_and_all_are_kept(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("opinion", "note"), [(Opinion.MUTED, " "), (Opinion.SEEN, "x" * (LONGEST_NOTE + 1))]
+    ("opinion", "note"), [(Opinion.MUTED, " "), (Opinion.SEEN, "x" * (MAX_NOTE_LENGTH + 1))]
 )
-def test_what_cannot_be_kept_is_refused(tmp_path: Path, opinion: Opinion, note: str) -> None:
+def test_invalid_feedback_is_refused(tmp_path: Path, opinion: Opinion, note: str) -> None:
     with pytest.raises(VisupError):
-        say(tmp_path, alert(1), opinion, note)
+        store_feedback(tmp_path, alert(1), opinion, note)
     assert not (tmp_path / FEEDBACK).exists()
 
 
-def test_lines_that_cannot_be_read_hide_no_others(tmp_path: Path) -> None:
-    say(tmp_path, alert(1), Opinion.SEEN)
+def test_invalid_lines_are_skipped(tmp_path: Path) -> None:
+    store_feedback(tmp_path, alert(1), Opinion.SEEN)
     with (tmp_path / FEEDBACK).open("a") as out:
         out.write('nonsense\n{"alert": 3}\n[]\n{"alert": "x", "kind": "k", "opinion": "loud"}\n')
-    say(tmp_path, alert(2), Opinion.RIGHT)
+    store_feedback(tmp_path, alert(2), Opinion.RIGHT)
     assert sorted(read_feedback(tmp_path)) == [1, 2]
 
 
@@ -58,15 +58,15 @@ OPINIONS = st.lists(st.tuples(st.sampled_from("ab"), st.none() | st.sampled_from
 
 
 @given(OPINIONS)
-def test_precision_is_the_share_of_right_ones_among_the_judged(
-    said: list[tuple[str, Opinion | None]],
+def test_precision_is_the_share_of_right_alerts_among_the_rated(
+    opinions: list[tuple[str, Opinion | None]],
 ) -> None:
-    alerts = [alert(n, kind) for n, (kind, _) in enumerate(said)]
+    alerts = [alert(n, kind) for n, (kind, _) in enumerate(opinions)]
     feedback = {
-        n: AlertFeedback(n, kind, opinion) for n, (kind, opinion) in enumerate(said) if opinion
+        n: AlertFeedback(n, kind, opinion) for n, (kind, opinion) in enumerate(opinions) if opinion
     }
     for found in precisions([(alerts, feedback)]):
-        of_kind = [o for kind, o in said if kind == found.kind]
+        of_kind = [o for kind, o in opinions if kind == found.kind]
         judged = [o for o in of_kind if o in (Opinion.RIGHT, Opinion.FALSE_ALARM)]
         assert found.alerts == len(of_kind)
         expected = judged.count(Opinion.RIGHT) / len(judged) if judged else None

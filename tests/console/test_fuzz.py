@@ -1,4 +1,4 @@
-"""Whatever is asked of the console: no failure inside, no file from outside, no socket for strangers."""
+"""No request causes an internal error, reads a file from outside, or opens a socket without permission."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from tests.console.running import OPERATOR
 from visup.console.access import COOKIE
 from visup.console.library import run_key
 
-MINE = f"Cookie: {COOKIE}={OPERATOR}"
+OPERATOR_COOKIE = f"Cookie: {COOKIE}={OPERATOR}"
 ROUTES = ("", "wall", "run", "picture", "thumbnail", "evidence", "_nicegui", "_nicegui_ws", "docs")
-UGLY = (
+HOSTILE_PARTS = (
     *("..", "../../secret.txt", "%2e%2e%2f%2e%2e%2fsecret.txt", "..%5c..", "%00", "%0d%0aX: y"),
     *("-1", "0", "99999999", "1" * 400, "9" * 5000, "1.jpg", "-1.jpg", "0.jpg", "1e9.jpg"),
     *("1.webm", "1.txt", "nan", "KEY", "KEY.jpg", "a" * 2000, "%ff%fe", "%E2%80%AE", "<b>", "'"),
@@ -31,35 +31,35 @@ METHODS = ("GET", "HEAD", "POST", "PUT", "DELETE", "OPTIONS", "PATCH", "TRACE", 
 BODIES = (b"", b"{}", b"0", b"\x00\xff" * 40, b'[{"event":"x"}]' * 40, b"a=b&c=d")
 
 
-def ask(console: str, request: str, *headers: str, body: bytes = b"") -> tuple[int, bytes]:
-    """Status and all that is answered; 0 where the connection is just closed."""
-    place = urlsplit(console)
-    lines = [f"{request} HTTP/1.1", f"Host: {place.netloc}", *headers]
+def send_request(console: str, request: str, *headers: str, body: bytes = b"") -> tuple[int, bytes]:
+    """Status and answer; 0 if the connection was closed without one."""
+    address = urlsplit(console)
+    lines = [f"{request} HTTP/1.1", f"Host: {address.netloc}", *headers]
     if body:
         lines.append(f"Content-Length: {len(body)}")
     if not any(line.startswith("Upgrade") for line in headers):
         lines.append("Connection: close")
     sent = "\r\n".join([*lines, "", ""]).encode("latin-1", "replace") + body
-    told = b""
+    answer = b""
     with (
-        socket.create_connection((place.hostname, place.port), timeout=60) as line,
+        socket.create_connection((address.hostname, address.port), timeout=60) as line,
         suppress(ConnectionError),  # a body that was not wanted is not read to its end
     ):
         line.sendall(sent)
-        while (got := line.recv(65536)) and len(told) < 2**22:
-            told += got
-            if told.startswith(b"HTTP/1.1 101"):
+        while (chunk := line.recv(65536)) and len(answer) < 2**22:
+            answer += chunk
+            if answer.startswith(b"HTTP/1.1 101"):
                 break
-    status = told.split(b" ", 2)[1:2]
-    return (int(status[0]) if status else 0), told
+    status = answer.split(b" ", 2)[1:2]
+    return (int(status[0]) if status else 0), answer
 
 
-def check(console: str, request: str, *headers: str, body: bytes = b"") -> int:
-    status, told = ask(console, request, *headers, body=body)
-    assert status < 500, (request, told[:500])
-    assert SECRET.encode() not in told
-    assert b"root:x:" not in told
-    assert b"Traceback" not in told
+def checked_status(console: str, request: str, *headers: str, body: bytes = b"") -> int:
+    status, answer = send_request(console, request, *headers, body=body)
+    assert status < 500, (request, answer[:500])
+    assert SECRET.encode() not in answer
+    assert b"root:x:" not in answer
+    assert b"Traceback" not in answer
     return status
 
 
@@ -72,7 +72,7 @@ def check(console: str, request: str, *headers: str, body: bytes = b"") -> int:
     st.sampled_from(METHODS),
     st.sampled_from(ROUTES),
     st.lists(
-        st.sampled_from(UGLY)
+        st.sampled_from(HOSTILE_PARTS)
         | st.text(
             st.characters(min_codepoint=33, max_codepoint=126, exclude_characters="#?"), max_size=8
         ),
@@ -81,12 +81,12 @@ def check(console: str, request: str, *headers: str, body: bytes = b"") -> int:
     st.sampled_from(QUERIES),
     st.sampled_from(BODIES),
 )
-def test_no_address_method_or_body_makes_it_fail(
+def test_no_request_causes_an_internal_error(
     console: str, folder: Path, method: str, route: str, parts: list[str], query: str, body: bytes
 ) -> None:
     key = run_key(folder / "evening")
     path = "/".join(["", route, *(p.replace("KEY", key) for p in parts)])
-    check(console, f"{method} {path}{query}", MINE, body=body)
+    checked_status(console, f"{method} {path}{query}", OPERATOR_COOKIE, body=body)
 
 
 @pytest.mark.parametrize(
@@ -116,37 +116,44 @@ def test_no_address_method_or_body_makes_it_fail(
         ("/openapi.json", 404),
     ],
 )
-def test_what_each_address_answers(console: str, folder: Path, path: str, status: int) -> None:
+def test_each_address_has_its_status(console: str, folder: Path, path: str, status: int) -> None:
     known = path.replace("KEY", run_key(folder / "evening"))
-    assert check(console, f"GET {known}", MINE) == status
-    assert check(console, f"GET {known}") == 403
-    assert check(console, f"GET {known}", MINE, "Origin: http://evil.example") == 403
+    assert checked_status(console, f"GET {known}", OPERATOR_COOKIE) == status
+    assert checked_status(console, f"GET {known}") == 403
+    assert (
+        checked_status(console, f"GET {known}", OPERATOR_COOKIE, "Origin: http://evil.example")
+        == 403
+    )
 
 
 @pytest.mark.parametrize("size", ["99999999", "-1", "x", "1, 2", ""])
-def test_long_and_odd_bodies_are_refused(console: str, size: str) -> None:
-    told = check(console, "POST /wall", MINE, f"Content-Length: {size}")
-    assert told in (0, 400, 403, 405)
+def test_long_and_malformed_bodies_are_refused(console: str, size: str) -> None:
+    answer = checked_status(console, "POST /wall", OPERATOR_COOKIE, f"Content-Length: {size}")
+    assert answer in (0, 400, 403, 405)
 
 
-def test_a_clip_is_given_in_parts(console: str, folder: Path) -> None:
+def test_a_clip_is_served_by_ranges(console: str, folder: Path) -> None:
     path = f"/evidence/{run_key(folder / 'evening')}/1.webm"
-    assert check(console, f"GET {path}", MINE, "Range: bytes=0-9") == 206
-    assert check(console, f"GET {path}", MINE, "Range: bytes=99999999-") == 416
-    assert check(console, f"GET {path}", MINE, "Range: nonsense") in (200, 400, 416)
+    assert checked_status(console, f"GET {path}", OPERATOR_COOKIE, "Range: bytes=0-9") == 206
+    assert checked_status(console, f"GET {path}", OPERATOR_COOKIE, "Range: bytes=99999999-") == 416
+    assert checked_status(console, f"GET {path}", OPERATOR_COOKIE, "Range: nonsense") in (
+        200,
+        400,
+        416,
+    )
 
 
 @pytest.mark.parametrize(
     "path", ["//evil.example/x", "/\\evil.example", "/%0d%0aX:%20y", "/%E2%82%AC"]
 )
-def test_the_token_never_leads_to_another_host(console: str, path: str) -> None:
-    status, told = ask(console, f"GET {path}?token={OPERATOR}")
+def test_the_redirect_with_the_token_stays_on_this_host(console: str, path: str) -> None:
+    status, answer = send_request(console, f"GET {path}?token={OPERATOR}")
     assert status in (303, 400)
-    head = told.decode("latin-1").lower()
+    head = answer.decode("latin-1").lower()
     if status == 303:
-        place = head.split("location: ")[1].split("\r\n")[0]
-        assert place.startswith("/")
-        assert not place.startswith(("//", "/\\"))
+        address = head.split("location: ")[1].split("\r\n")[0]
+        assert address.startswith("/")
+        assert not address.startswith(("//", "/\\"))
         assert "\r\nx:" not in head
 
 
@@ -156,15 +163,17 @@ def test_the_token_never_leads_to_another_host(console: str, path: str) -> None:
         ("/_nicegui_ws/socket.io/?EIO=4&transport=websocket", ()),
         (
             "/_nicegui_ws/socket.io/?EIO=4&transport=websocket",
-            (MINE, "Origin: http://evil.example"),
+            (OPERATOR_COOKIE, "Origin: http://evil.example"),
         ),
-        ("/_nicegui_ws/socket.io/?EIO=4&transport=websocket", (MINE, "Origin: null")),
-        ("/run/x", (MINE,)),
-        ("/../..", (MINE,)),
-        ("/", (MINE,)),
+        ("/_nicegui_ws/socket.io/?EIO=4&transport=websocket", (OPERATOR_COOKIE, "Origin: null")),
+        ("/run/x", (OPERATOR_COOKIE,)),
+        ("/../..", (OPERATOR_COOKIE,)),
+        ("/", (OPERATOR_COOKIE,)),
     ],
 )
-def test_sockets_are_refused(console: str, path: str, headers: tuple[str, ...]) -> None:
+def test_sockets_without_permission_are_refused(
+    console: str, path: str, headers: tuple[str, ...]
+) -> None:
     key = base64.b64encode(os.urandom(16)).decode()
     upgrade = (
         "Upgrade: websocket",
@@ -172,4 +181,4 @@ def test_sockets_are_refused(console: str, path: str, headers: tuple[str, ...]) 
         f"Sec-WebSocket-Key: {key}",
         "Sec-WebSocket-Version: 13",
     )
-    assert check(console, f"GET {path}", *upgrade, *headers) in (400, 403, 404)
+    assert checked_status(console, f"GET {path}", *upgrade, *headers) in (400, 403, 404)

@@ -1,4 +1,4 @@
-"""The console in a real browser: what somebody does in it, and that nothing goes wrong on the way."""
+"""The console in a real browser; errors of scripts fail the tests."""
 
 from __future__ import annotations
 
@@ -11,40 +11,40 @@ import numpy as np
 from tests.archive.recordings import record
 from tests.clips import write_clip
 from tests.console.browsing import (
-    LISTEN,
-    enter,
-    follow,
+    RECORD_ERRORS,
+    accessibility_violations,
+    open_from_list,
     open_run,
-    press,
-    shows,
-    switch,
-    tab,
-    violations,
+    open_tab,
+    press_button,
+    sign_in,
+    toggle_checkbox,
+    wait_for_text,
 )
 from tests.console.running import OPERATOR, VIEWER
-from tests.console.test_runs import SETTINGS, doubtful
+from tests.console.test_runs import SETTINGS, ambiguous_observations
 from tests.paths import ROOT
 from tests.teaching.browser import Browser
 from visup.console.feedback import read_feedback
-from visup.console.workbench.remembering import MODELS
+from visup.console.workbench.object_teaching import MODELS
 from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.runs.inputs.zones import load_zones
 
 
-def test_a_run_is_found_and_opened(browser: Browser, address: str) -> None:
-    enter(browser, address)
+def test_a_run_can_be_searched_and_opened(browser: Browser, address: str) -> None:
+    sign_in(browser, address)
     browser.until("document.querySelectorAll('.runs tbody tr').length == 4")
-    shows(browser, "<b>morning")
+    wait_for_text(browser, "<b>morning")
     assert "token" not in browser.value("location.href")
     browser.value("document.querySelector('input[aria-label=\"Search runs\"]').focus()")
     browser.type("dock even")
     browser.until("document.querySelectorAll('.runs tbody tr').length == 1")
     browser.value("document.querySelector('.runs a').click()")
-    shows(browser, "frame 0")
-    shows(browser, "approach")
+    wait_for_text(browser, "frame 0")
+    wait_for_text(browser, "approach")
 
 
-def test_one_cursor_moves_picture_timeline_and_belief(browser: Browser, address: str) -> None:
+def test_one_cursor_moves_picture_timeline_and_beliefs(browser: Browser, address: str) -> None:
     open_run(browser, address)
     x, y, w, _ = browser.value(
         "(() => { const r = document.querySelector('.bars').getBoundingClientRect();"
@@ -52,29 +52,29 @@ def test_one_cursor_moves_picture_timeline_and_belief(browser: Browser, address:
     )
     browser.click(x + 0.5 * w, y + 8)
     browser.until("/29|30/.test(document.querySelector('img.picture').src.split('/').pop())")
-    shows(browser, "frame 29")
+    wait_for_text(browser, "frame 29")
     browser.press("ArrowRight")
-    shows(browser, "frame 30")
+    wait_for_text(browser, "frame 30")
     browser.press("End")
-    shows(browser, "frame 59")
+    wait_for_text(browser, "frame 59")
     browser.press("Home")
-    shows(browser, "frame 0")
+    wait_for_text(browser, "frame 0")
     browser.press("n")
     browser.until("document.body && !document.body.innerText.includes('frame 0')")
     browser.press(" ")
     browser.until("document.body?.innerText.includes('frame 59')")
 
 
-def test_relations_lie_over_the_picture_and_a_click_says_who_it_is(
+def test_relations_are_overlaid_and_a_click_shows_the_identity(
     browser: Browser, address: str
 ) -> None:
     open_run(browser, address)
     browser.press("End")
-    shows(browser, "frame 59")
-    shows(browser, "captured")
+    wait_for_text(browser, "frame 59")
+    wait_for_text(browser, "captured")
     assert browser.value("document.querySelectorAll('svg.flow .box').length") == 2
-    switch(browser, "relations")
-    switch(browser, "trails")
+    toggle_checkbox(browser, "relations")
+    toggle_checkbox(browser, "trails")
     browser.until("document.querySelectorAll('.overlay .vector').length == 1")
     assert browser.value("document.querySelector('.overlay .vector text').textContent") in (
         "diverging",
@@ -86,50 +86,48 @@ def test_relations_lie_over_the_picture_and_a_click_says_who_it_is(
     browser.click(x, y)
     browser.until("document.body?.innerText.toUpperCase().includes('IDENTITY OF OBJECT 2')")
     browser.until("!!document.querySelector('.overlay .chosen')")
-    shows(browser, "0.90")
-    switch(browser, "relations")
+    wait_for_text(browser, "0.90")
+    toggle_checkbox(browser, "relations")
     browser.until("document.querySelectorAll('.overlay .vector').length == 0")
 
 
 def test_why_and_what_if_are_answered(browser: Browser, address: str) -> None:
     open_run(browser, address)
     browser.press("End")
-    shows(browser, "frame 59")
-    tab(browser, "Ask")
-    press(browser, "identity 1")
-    shows(browser, "[frame")
-    tab(browser, "What if")
+    wait_for_text(browser, "frame 59")
+    open_tab(browser, "Ask")
+    press_button(browser, "identity 1")
+    wait_for_text(browser, "[frame")
+    open_tab(browser, "What if")
     browser.until("document.querySelector('input[aria-label=\"What is assumed\"]')")
     browser.value("document.querySelector('input[aria-label=\"What is assumed\"]').focus()")
     browser.type("object 99 arm")
-    press(browser, "Try")
-    shows(browser, "there is no object 99")
+    press_button(browser, "Try")
+    wait_for_text(browser, "there is no object 99")
 
 
-def test_it_stops_at_breakpoints_and_goes_through_the_phases_of_a_step(
-    browser: Browser, address: str
-) -> None:
+def test_breakpoints_and_phases_work_on_the_page(browser: Browser, address: str) -> None:
     open_run(browser, address)
-    tab(browser, "Steps")
-    press(browser, "Continue")
-    shows(browser, "alert: ")
+    open_tab(browser, "Steps")
+    press_button(browser, "Continue")
+    wait_for_text(browser, "alert: ")
     browser.until("!document.body?.innerText.includes('frame 0')")
     field = "document.querySelector('input[aria-label=\"Where to stop\"]')"
     browser.value(f"{field}.focus()")
     browser.type("when gap(")
     browser.press("Enter")
-    shows(browser, "when gap(")
-    press(browser, "Continue")
+    wait_for_text(browser, "when gap(")
+    press_button(browser, "Continue")
     browser.until("document.querySelector('[role=status]')?.innerText.includes('ends too early')")
     for phase in ("perceive", "update", "cogitate"):
-        press(browser, "Next phase")
+        press_button(browser, "Next phase")
         browser.until(
             f"[...document.querySelectorAll('.phase')].some(p => p.innerText == '{phase}')"
         )
-    assert violations(browser) == []
+    assert accessibility_violations(browser) == []
 
 
-def choose(browser: Browser, label: str, option: str) -> None:
+def choose_option(browser: Browser, label: str, option: str) -> None:
     x, y = browser.value(
         f"(() => {{ const r = document.querySelector('[aria-label=\"{label}\"]').closest('.q-field')"
         ".getBoundingClientRect(); return [r.x + 20, r.y + r.height / 2]; })()"
@@ -140,29 +138,29 @@ def choose(browser: Browser, label: str, option: str) -> None:
     browser.value(f"{item}.click()")
 
 
-def test_a_task_is_written_checked_tried_and_a_zone_is_drawn_and_saved(
+def test_a_task_is_checked_and_tried_and_a_zone_is_drawn_and_saved(
     browser: Browser, address: str, folder: Path
 ) -> None:
     open_run(browser, address)
-    tab(browser, "Write")
+    open_tab(browser, "Write")
     browser.until("document.querySelector('.cm-content')?.getAttribute('aria-label') == 'Text'")
     browser.value("document.querySelector('.cm-content').focus()")
     browser.type("<go> ::= convrging(arm, satellite)")
     browser.until("!!document.querySelector('.cm-line.fault-line')")
-    shows(browser, "converging")
+    wait_for_text(browser, "converging")
     browser.value("document.activeElement.blur()")  # its cursor blinks for ever
-    assert violations(browser) == []
+    assert accessibility_violations(browser) == []
     browser.value("document.querySelector('.cm-content').focus()")
     browser.value("document.execCommand('selectAll')")
     browser.type("<go> ::= converging(arm, satellite)")
-    shows(browser, "No mistakes.")
-    press(browser, "Try it on this run")
-    shows(browser, "verdict:")
+    wait_for_text(browser, "No mistakes.")
+    press_button(browser, "Try it on this run")
+    wait_for_text(browser, "verdict:")
     browser.value("document.querySelector('.cm-content').focus()")
     browser.value("document.execCommand('selectAll')")
     browser.press("Backspace")
-    choose(browser, "What is written", "zones")
-    shows(browser, "Click the corners")
+    choose_option(browser, "What is written", "zones")
+    wait_for_text(browser, "Click the corners")
     browser.value("document.querySelector('.q-toggle').click()")
     x, y, w, h = browser.settled(
         "(() => { const r = document.querySelector('svg.overlay').getBoundingClientRect();"
@@ -173,89 +171,94 @@ def test_a_task_is_written_checked_tried_and_a_zone_is_drawn_and_saved(
         browser.until(f"document.querySelectorAll('.overlay .corner').length == {count}")
     browser.value("document.querySelector('[aria-label=\"Name of the zone\"]').focus()")
     browser.type("dock")
-    press(browser, "Add zone")
-    shows(browser, "[[zone]]")
+    press_button(browser, "Add zone")
+    wait_for_text(browser, "[[zone]]")
     browser.value("document.querySelector('[aria-label=\"Name of the file\"]').focus()")
     browser.type("mine")
-    press(browser, "Save")
-    shows(browser, "saved as mine.toml")
+    press_button(browser, "Save")
+    wait_for_text(browser, "saved as mine.toml")
     (zone,) = load_zones(folder.parent / "saved" / "mine.toml")
     assert (zone.name, len(zone.polygon)) == ("dock", 3)
 
 
-def test_why_an_object_looks_like_a_model_is_shown(
+def test_an_object_is_compared_with_views_and_taught(
     browser: Browser, address: str, folder: Path
 ) -> None:
     models = ROOT / "visup" / "data" / "demo.models"
     clip = write_clip(
         folder.parent / "alike.avi", [np.full((480, 640, 3), 90, np.uint8)] * 60, 10.0
     )
-    record(folder / "alike", doubtful(), replace(SETTINGS, models=models), source=str(clip))
+    record(
+        folder / "alike",
+        ambiguous_observations(),
+        replace(SETTINGS, models=models),
+        source=str(clip),
+    )
     try:
-        enter(browser, address)
-        follow(browser, "alike")
+        sign_in(browser, address)
+        open_from_list(browser, "alike")
         browser.press("End")
-        shows(browser, "frame 59")
+        wait_for_text(browser, "frame 59")
         browser.until("!!document.querySelector('[aria-label=\"identity of object 1\"]')")
         browser.value("document.querySelector('[aria-label=\"identity of object 1\"]').click()")
-        press(browser, "Compare views")
+        press_button(browser, "Compare views")
         browser.until("document.querySelector('.likeness img')?.naturalWidth > 1000")
-        assert violations(browser) == []
-        press(browser, "Close")
+        assert accessibility_violations(browser) == []
+        press_button(browser, "Close")
         browser.until("!document.querySelector('.likeness')")
         browser.value("document.querySelector('[aria-label=\"Name of the model\"]').focus()")
         browser.type("box")
-        press(browser, "Remember as a model")
-        shows(browser, "is known from now on")
+        press_button(browser, "Remember as a model")
+        wait_for_text(browser, "is known from now on")
         known = ModelDatabase.open(folder.parent / "saved" / MODELS)
         assert [v.name for v in known.taught] == ["box"]
     finally:
         rmtree(folder / "alike")
 
 
-def test_an_alert_is_judged_by_an_operator_and_not_by_a_viewer(
+def test_only_operators_can_give_feedback_on_alerts(
     browser: Browser, address: str, folder: Path
 ) -> None:
     open_run(browser, address, VIEWER)
-    tab(browser, "Alerts")
-    shows(browser, "only alerts open")
+    open_tab(browser, "Alerts")
+    wait_for_text(browser, "only alerts open")
     assert not browser.value("document.body?.innerText.includes('false alarm')")
     browser.open(f"{address}?token={OPERATOR}")
     open_run(browser, address)
-    tab(browser, "Alerts")
-    press(browser, "false alarm")
+    open_tab(browser, "Alerts")
+    press_button(browser, "false alarm")
     browser.until("!!document.querySelector('.opinion')")
     end = [f.opinion for f in read_feedback(folder / "evening").values()]
     assert end == ["false alarm"]
 
 
-def test_the_wall_shows_alerts_with_pictures_and_keeps_who_saw_them(
+def test_the_wall_shows_alerts_with_pictures_and_stores_feedback(
     browser: Browser, address: str, folder: Path
 ) -> None:
-    browser.call("Page.addScriptToEvaluateOnNewDocument", source=LISTEN)
+    browser.call("Page.addScriptToEvaluateOnNewDocument", source=RECORD_ERRORS)
     browser.open(f"{address}wall?token={VIEWER}")
     loaded = "document.querySelector('.evidence img')?.naturalWidth > 0"
     browser.until(loaded)
     assert not browser.value("document.body?.innerText.includes('false alarm')")
     browser.open(f"{address}wall?token={OPERATOR}")
     browser.until(loaded)
-    assert violations(browser) == []
+    assert accessibility_violations(browser) == []
     browser.value("document.querySelector('button.evidence').click()")
     browser.until("document.querySelector('.evidence-large video')?.readyState > 1")
-    press(browser, "Close")
+    press_button(browser, "Close")
     browser.until("!document.querySelector('.evidence-large')")
-    press(browser, "seen")
+    press_button(browser, "seen")
     browser.until("!!document.querySelector('.opinion')")
     assert [f.opinion for f in read_feedback(folder / "yard-run").values()] == ["seen"]
     browser.value("document.querySelector('input[aria-label=\"Search alerts\"]').focus()")
     browser.type("nowhere")
-    shows(browser, "No such alerts.")
+    wait_for_text(browser, "No such alerts.")
 
 
-def test_everybody_can_use_it(browser: Browser, address: str) -> None:
+def test_all_panels_are_accessible(browser: Browser, address: str) -> None:
     browser.open(f"{address}?token={OPERATOR}")
     browser.until("document.querySelectorAll('.runs tbody a').length == 4")
-    assert violations(browser) == []
+    assert accessibility_violations(browser) == []
     open_run(browser, address)
     for name, text in (
         ("Now", "approach"),
@@ -264,15 +267,15 @@ def test_everybody_can_use_it(browser: Browser, address: str) -> None:
         ("Ask", "Why?"),
         ("What if", "from the cursor on"),
     ):
-        tab(browser, name)
-        shows(browser, text)
-        assert violations(browser) == [], name
+        open_tab(browser, name)
+        wait_for_text(browser, text)
+        assert accessibility_violations(browser) == [], name
     browser.value("document.querySelector('[aria-label=\"Dark or light\"]').click()")
     browser.until("document.body.classList.contains('body--dark')")
-    assert violations(browser) == []
+    assert accessibility_violations(browser) == []
 
 
-def test_it_fits_a_telephone_and_shows_the_wall(tmp_path: Path, address: str) -> None:
+def test_pages_fit_a_phone(tmp_path: Path, address: str) -> None:
     with Browser(tmp_path / "small", (390, 780)) as browser:
         browser.call(
             "Emulation.setDeviceMetricsOverride",
@@ -287,5 +290,5 @@ def test_it_fits_a_telephone_and_shows_the_wall(tmp_path: Path, address: str) ->
         )  # an icon without its font is a long word
         browser.until("document.documentElement.scrollWidth <= 390")
         browser.value("document.querySelector('a[href=\"/wall\"]').click()")
-        shows(browser, "picture of alert")
+        wait_for_text(browser, "picture of alert")
         assert browser.value("document.documentElement.scrollWidth") <= 390

@@ -1,4 +1,4 @@
-"""What all pages share."""
+"""The state shared by all pages."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ SECRET = TaskError("unexpected word", where=SourceLocation("/etc/keys", 1, 1, "s
 
 
 @pytest.mark.parametrize("fault", [SECRET, ErrorGroup([SECRET, SECRET])])
-def test_no_line_of_a_file_that_only_a_run_names_is_quoted(
+def test_errors_quote_no_line_of_files_that_a_run_names(
     fault: Exception, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refused(folder: Path) -> None:
+    def refuse(folder: Path) -> None:
         raise fault
 
-    monkeypatch.setattr(state, "Inquiry", refused)
-    with pytest.raises(OutputError) as told:
-        state._opened(tmp_path)
-    assert "swordfish" not in str(told.value)
-    assert "/etc" not in str(told.value)
+    monkeypatch.setattr(state, "Inquiry", refuse)
+    with pytest.raises(OutputError) as caught:
+        state._open_inquiry(tmp_path)
+    assert "swordfish" not in str(caught.value)
+    assert "/etc" not in str(caught.value)
 
 
-def test_a_run_that_takes_the_place_of_another_is_read_anew(tmp_path: Path) -> None:
+def test_a_run_that_replaces_another_is_read_again(tmp_path: Path) -> None:
     record(tmp_path / "runs" / "a", meeting(30), SETTINGS)
     shared = ConsoleState(RunLibrary([tmp_path / "runs"]))
     (entry,) = shared.library.scan()

@@ -1,4 +1,4 @@
-"""Rows of the timeline: laws of their spans, and what becomes of events."""
+"""Rows of the timeline and their spans."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from visup.agent import Alert, Event, Severity, Status
 from visup.agent.model.records import ReportState
 from visup.console.drawing.timeline_svg import timeline_svg
-from visup.console.tracks import PRESENCE, TimelineTrack, behaviour_tracks, tracks_of
+from visup.console.tracks import PRESENCE_OF_EVENT, TimelineTrack, behaviour_tracks, tracks_of
 
 TIMES = st.floats(0.0, 50.0)
 STAGES = st.builds(
@@ -30,7 +30,7 @@ STAGES = st.builds(
 )
 PRESENCES = st.builds(
     lambda kind, time, number: Event(kind, time, 0, f"Object {number} <b>", objects=(number,)),
-    st.sampled_from(sorted(PRESENCE)),
+    st.sampled_from(sorted(PRESENCE_OF_EVENT)),
     TIMES,
     st.integers(1, 4),
 )
@@ -57,44 +57,44 @@ ALERTS = st.lists(
 )
 
 
-def one_after_the_other(track: TimelineTrack) -> bool:
+def do_not_overlap(track: TimelineTrack) -> bool:
     pairs = zip(track.spans, track.spans[1:], strict=False)
     return all(a.end <= b.start + 1e-9 for a, b in pairs)
 
 
 @given(EVENTS, ALERTS)
-def test_spans_lie_within_the_run_and_states_never_overlap(
+def test_spans_are_within_the_run_and_states_do_not_overlap(
     events: list[Event], alerts: list[Alert]
 ) -> None:
     rows = tracks_of(events, alerts, 60.0)
     for track in rows:
         assert all(0.0 <= s.start <= s.end <= 60.0 for s in track.spans)
-        assert track.group == "alert" or one_after_the_other(track)
+        assert track.group == "alert" or do_not_overlap(track)
     assert len({(t.group, t.label, t.object_id) for t in rows}) == len(rows)
 
 
 @given(EVENTS)
-def test_a_row_says_what_the_last_event_before_a_time_said(events: list[Event]) -> None:
+def test_a_row_has_the_state_of_the_last_event(events: list[Event]) -> None:
     rows = {t.label: t for t in tracks_of(events, (), 60.0) if t.group == "stage"}
     for label, track in rows.items():
-        told = [e for e in events if e.data.get("stage") == label]
+        reported = [e for e in events if e.data.get("stage") == label]
         for moment in (0.0, 13.3, 27.7, 55.0):
-            before = [e for e in told if e.time <= moment]
+            before = [e for e in reported if e.time <= moment]
             state = before[-1].data["status"] if before else "pending"
-            shown = [s.state for s in track.spans if s.start <= moment < s.end]
-            assert (shown or ["pending"])[-1] == state
+            states = [s.state for s in track.spans if s.start <= moment < s.end]
+            assert (states or ["pending"])[-1] == state
 
 
 @given(EVENTS, ALERTS)
-def test_the_picture_is_sound_whatever_was_told(events: list[Event], alerts: list[Alert]) -> None:
+def test_the_timeline_is_valid_svg_with_all_spans(events: list[Event], alerts: list[Alert]) -> None:
     rows = tracks_of(events, alerts, 60.0)
-    picture = ET.fromstring(timeline_svg(rows, 60.0))
-    bars = [r for r in picture.iter() if r.tag == "rect" and r.get("class") != "row"]
+    drawing = ET.fromstring(timeline_svg(rows, 60.0))
+    bars = [r for r in drawing.iter() if r.tag == "rect" and r.get("class") != "row"]
     assert len(bars) == sum(len(t.spans) for t in rows)
     assert not re.search("<b>", timeline_svg(rows, 60.0))
 
 
-def test_objects_are_called_by_their_actors() -> None:
+def test_objects_are_labelled_with_their_actors() -> None:
     events = [
         Event("entry", 1.0, 10, "Object 1 is in view.", objects=(1,)),
         Event("identified", 2.0, 20, "Object 1 is the arm.", objects=(1,), data={"name": "rms"}),
@@ -114,15 +114,15 @@ STATES = st.lists(
 
 
 @given(STATES)
-def test_a_behaviour_that_did_not_always_run_has_a_row_that_says_what_it_did(
+def test_a_behaviour_that_paused_has_a_row_with_its_states(
     states: list[dict[str, str]],
 ) -> None:
     seconds = float(len(states))
     rows = behaviour_tracks([(float(k), now) for k, now in enumerate(states)], seconds)
-    told = {row.label: row.spans for row in rows}
+    reported = {row.label: row.spans for row in rows}
     for name in ("motion", "shape", "closer_look"):
         moments = [(float(k), now[name]) for k, now in enumerate(states) if name in now]
-        spans = told.get(name.replace("_", " "), ())
+        spans = reported.get(name.replace("_", " "), ())
         assert bool(spans) == any(state != "ran" for _, state in moments)
         for time, state in moments if spans else ():
             assert [s.state for s in spans if s.start <= time < s.end] == [state]
@@ -130,8 +130,8 @@ def test_a_behaviour_that_did_not_always_run_has_a_row_that_says_what_it_did(
 
 
 @given(EVENTS, st.floats(0.0, 1e5))
-def test_a_run_that_follows_another_has_its_own_axis(events: list[Event], start: float) -> None:
-    """Whenever it began, the picture is the same."""
+def test_the_time_axis_starts_with_the_run(events: list[Event], start: float) -> None:
+    """The drawing does not depend on the start time."""
     rows = [t for t in tracks_of(events, (), 60.0) if t.spans]
     later = [
         replace(
@@ -140,10 +140,10 @@ def test_a_run_that_follows_another_has_its_own_axis(events: list[Event], start:
         )
         for t in rows
     ]
-    shown = _places(timeline_svg(later, 60.0 + start, start))
-    assert shown == pytest.approx(_places(timeline_svg(rows, 60.0)), abs=0.02)
+    positions = _bar_positions(timeline_svg(later, 60.0 + start, start))
+    assert positions == pytest.approx(_bar_positions(timeline_svg(rows, 60.0)), abs=0.02)
 
 
-def _places(picture: str) -> list[float]:
-    bars = [b for b in ET.fromstring(picture).iter() if b.tag == "rect"]
+def _bar_positions(drawing: str) -> list[float]:
+    bars = [b for b in ET.fromstring(drawing).iter() if b.tag == "rect"]
     return [float(b.get(key) or 0.0) for b in bars for key in ("x", "width")]

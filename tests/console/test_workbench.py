@@ -1,4 +1,4 @@
-"""What is written in the page: checked, completed, saved; never a file besides."""
+"""Texts written in the page are checked, completed and saved; no other file is touched."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from visup.agent import Zone
 from visup.agent.model.errors import VisupError
-from visup.console.workbench.drafts import DraftKind, begun_word, check_draft, words_at
-from visup.console.workbench.saving import ENDINGS, save_draft
+from visup.console.workbench.drafts import DraftKind, check_draft, completion_prefix, completions_at
+from visup.console.workbench.saving import SUFFIXES, save_draft
 from visup.runs.inputs.zones import area, load_zones, read_zones, zones_text
 
 TASK = "<go> ::= <near>\n<near> ::= converging(arm, satellite)\n"
@@ -23,7 +23,7 @@ corners = st.lists(st.tuples(numbers, numbers), min_size=3, max_size=6).map(tupl
 
 
 @given(corners, st.from_regex(r"[A-Za-z_][A-Za-z0-9_]{0,8}", fullmatch=True))
-def test_a_zone_that_is_drawn_is_read_as_it_was_drawn(
+def test_a_drawn_zone_is_read_back_unchanged(
     polygon: tuple[tuple[float, float], ...], name: str
 ) -> None:
     assume(area(polygon) >= 1.0)  # a line is no zone
@@ -31,7 +31,7 @@ def test_a_zone_that_is_drawn_is_read_as_it_was_drawn(
     assert (read.name, read.polygon) == (name, polygon)
 
 
-def test_several_zones_with_depth_are_read_back(tmp_path: Path) -> None:
+def test_zones_with_depth_are_read_back_unchanged(tmp_path: Path) -> None:
     zones = read_zones(f"{ZONES}depth = [1.5, 4]\n\n{ZONES.replace('dock', 'yard')}", "zones")
     (tmp_path / "a.toml").write_text(zones_text(zones))
     assert load_zones(tmp_path / "a.toml") == zones
@@ -51,7 +51,7 @@ def test_several_zones_with_depth_are_read_back(tmp_path: Path) -> None:
         ("task", "x" * 200_000, 0),
     ],
 )
-def test_mistakes_are_told_with_their_lines(kind: str, text: str, line: int) -> None:
+def test_mistakes_are_reported_with_their_lines(kind: str, text: str, line: int) -> None:
     found = check_draft(DraftKind(kind), text)
     assert found.faults
     assert found.faults[0].line == line
@@ -60,9 +60,9 @@ def test_mistakes_are_told_with_their_lines(kind: str, text: str, line: int) -> 
 
 
 @pytest.mark.parametrize("kind", list(DraftKind))
-def test_what_is_right_has_a_tree_and_what_is_empty_is_not_wrong(kind: DraftKind) -> None:
-    good = {DraftKind.TASK: TASK, DraftKind.RULES: RULES, DraftKind.ZONES: ZONES}[kind]
-    found = check_draft(kind, good)
+def test_correct_texts_have_an_outline_and_empty_ones_no_mistakes(kind: DraftKind) -> None:
+    text = {DraftKind.TASK: TASK, DraftKind.RULES: RULES, DraftKind.ZONES: ZONES}[kind]
+    found = check_draft(kind, text)
     assert not found.faults
     assert found.tree
     assert [z.name for z in found.zones] == (["dock"] if kind is DraftKind.ZONES else [])
@@ -70,31 +70,35 @@ def test_what_is_right_has_a_tree_and_what_is_empty_is_not_wrong(kind: DraftKind
     assert not check_draft(kind, "").faults
 
 
-def test_words_fit_what_is_begun() -> None:
-    opened = TASK.index("<near>") + 1
-    assert [w.text for w in words_at(DraftKind.TASK, TASK, opened)] == ["go", "near"]
-    at = TASK.index("converging") + 4
-    assert "converging" in [w.text for w in words_at(DraftKind.TASK, TASK, at)]
-    assert {w.text for w in words_at(DraftKind.RULES, "rule a: when touc", 17)} == {"touching"}
-    assert words_at(DraftKind.ZONES, "[[zo", 4) == []
+def test_completions_fit_the_typed_prefix() -> None:
+    offset = TASK.index("<near>") + 1
+    assert [w.text for w in completions_at(DraftKind.TASK, TASK, offset)] == ["go", "near"]
+    offset = TASK.index("converging") + 4
+    assert "converging" in [w.text for w in completions_at(DraftKind.TASK, TASK, offset)]
+    assert {w.text for w in completions_at(DraftKind.RULES, "rule a: when touc", 17)} == {
+        "touching"
+    }
+    assert completions_at(DraftKind.ZONES, "[[zo", 4) == []
 
 
 @given(st.text(max_size=20))
-def test_the_word_that_is_begun_is_the_end_of_the_text(text: str) -> None:
-    word = begun_word(text)
+def test_the_completion_prefix_is_the_end_of_the_text(text: str) -> None:
+    word = completion_prefix(text)
     assert text.endswith(word)
-    assert begun_word(f"{text} ") == ""
+    assert completion_prefix(f"{text} ") == ""
 
 
 @pytest.mark.parametrize("kind", list(DraftKind))
-def test_a_text_without_mistakes_is_saved_once(tmp_path: Path, kind: DraftKind) -> None:
-    good = {DraftKind.TASK: TASK, DraftKind.RULES: RULES, DraftKind.ZONES: ZONES}[kind]
-    path = save_draft(tmp_path, kind, "mine", good, replace=False)
-    assert path == tmp_path / f"mine{ENDINGS[kind]}"
-    assert path.read_text() == good
+def test_only_texts_without_mistakes_are_saved_and_none_is_overwritten(
+    tmp_path: Path, kind: DraftKind
+) -> None:
+    text = {DraftKind.TASK: TASK, DraftKind.RULES: RULES, DraftKind.ZONES: ZONES}[kind]
+    path = save_draft(tmp_path, kind, "mine", text, replace=False)
+    assert path == tmp_path / f"mine{SUFFIXES[kind]}"
+    assert path.read_text() == text
     with pytest.raises(VisupError, match="already"):
-        save_draft(tmp_path, kind, "mine", good, replace=False)
-    save_draft(tmp_path, kind, "mine", f"{good}\n", replace=True)
+        save_draft(tmp_path, kind, "mine", text, replace=False)
+    save_draft(tmp_path, kind, "mine", f"{text}\n", replace=True)
     with pytest.raises(VisupError, match="mistakes"):
         save_draft(tmp_path, kind, "other", "nonsense [", replace=False)
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
@@ -103,13 +107,13 @@ def test_a_text_without_mistakes_is_saved_once(tmp_path: Path, kind: DraftKind) 
 @pytest.mark.parametrize(
     "name", ["", "..", "../a", "a/b", "/etc/x", "a.task", ".hidden", "a\0", "x" * 80, "ä", "a b"]
 )
-def test_no_name_leads_out_of_the_folder(tmp_path: Path, name: str) -> None:
+def test_names_with_paths_are_refused(tmp_path: Path, name: str) -> None:
     with pytest.raises(VisupError, match="no name"):
         save_draft(tmp_path, DraftKind.TASK, name, TASK, replace=True)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_link_is_never_written_through(tmp_path: Path) -> None:
+def test_links_are_not_written_through(tmp_path: Path) -> None:
     (tmp_path / "into").mkdir()
     (tmp_path / "victim").write_text("mine")
     (tmp_path / "into" / "a.task").symlink_to(tmp_path / "victim")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from tests.archive.recordings import meeting, record
 from visup.api.recorded import open_run
-from visup.console.feedback import Opinion, say
+from visup.console.feedback import Opinion, store_feedback
 from visup.evaluation.feedback import evaluate_feedback
 
 
@@ -17,8 +17,8 @@ def test_what_people_said_is_counted_over_all_runs(tmp_path: Path) -> None:
     (tmp_path / "damaged" / "journal.sqlite").write_bytes(b"none")
     alerts = list(open_run(tmp_path / "one").alerts)
     assert alerts
-    say(tmp_path / "one", alerts[0], Opinion.RIGHT)
-    say(tmp_path / "two", alerts[0], Opinion.FALSE_ALARM)
+    store_feedback(tmp_path / "one", alerts[0], Opinion.RIGHT)
+    store_feedback(tmp_path / "two", alerts[0], Opinion.FALSE_ALARM)
     figures = evaluate_feedback(tmp_path)
     assert figures["total"]["precision"] == 0.5
     assert (figures["total"]["runs"], figures["total"]["unreadable"]) == (2, 1)

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.clips import moving_disc, write_clip
-from tests.console.test_runs import SETTINGS, doubtful
+from tests.console.test_runs import SETTINGS, ambiguous_observations
 from tests.paths import ROOT
 from tests.report.scene import frame_at
 from tests.runs.test_resume import BARE
@@ -25,7 +25,7 @@ from visup.runs.runner import supervise
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import reasoning_agent
 
-SEEN = list(doubtful(24))
+SEEN = list(ambiguous_observations(24))
 FRAME = frame_at(0)
 
 

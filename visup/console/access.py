@@ -26,13 +26,13 @@ Send = Callable[[Message], Awaitable[None]]
 Application = Callable[[Scope, Receive, Send], Awaitable[None]]
 
 COOKIE = "visup_console"
-PARAMETER = "token"
+TOKEN_PARAMETER = "token"
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]", "::1")
-WHO = "visup_role"
+ROLE_KEY = "visup_role"
 """Key of the role in the scope of a request."""
 
-LONGEST_BODY = 2**20
-"""Bytes of a request; pages send far less."""
+MAX_BODY_BYTES = 2**20
+"""Maximum size of the body of a request; pages send far less."""
 
 
 class ConsoleRole(StrEnum):
@@ -83,49 +83,49 @@ class AccessGuard:
             await self._app(scope, receive, send)
             return
         headers = _headers(scope["headers"])
-        fault = self._fault(headers)
+        refusal = self._refusal_reason(headers)
         query = parse_qs(scope.get("query_string", b"").decode("latin-1"))
-        token = query.get(PARAMETER, [""])[0]
-        role = self._access.role(token or _cookie(headers.get("cookie", "")))
-        if fault or role is None:
-            await _refuse(scope, send, fault or _UNKNOWN, headers.get("accept", ""))
+        token = query.get(TOKEN_PARAMETER, [""])[0]
+        role = self._access.role(token or _token_in_cookie(headers.get("cookie", "")))
+        if refusal or role is None:
+            await _refuse(scope, send, refusal or _HOW_TO_OPEN, headers.get("accept", ""))
         elif token and scope["type"] == "http":
             await _set_cookie(scope, send, token)
         else:
-            scope[WHO] = role
+            scope[ROLE_KEY] = role
             await self._app(scope, receive, send)
 
-    def _fault(self, headers: Mapping[str, str]) -> str:
+    def _refusal_reason(self, headers: Mapping[str, str]) -> str:
         """Why a request is refused regardless of its token; empty if it is not."""
         host = headers.get("host", "")
-        if _name(host) not in self._access.hosts:
+        if _without_port(host) not in self._access.hosts:
             return "This console is not known by that name."
         origin = headers.get("origin")
         if origin is not None and urlsplit(origin).netloc != host:
             return "This request came from another page; only the console's own pages may make it."
         length = headers.get("content-length", "0")
-        if not length.isdecimal() or int(length) > LONGEST_BODY:
+        if not length.isdecimal() or int(length) > MAX_BODY_BYTES:
             return "This request is too long."
         return ""
 
 
-_UNKNOWN = (
+_HOW_TO_OPEN = (
     "Open it by the address that visup console printed when it started, which ends in ?token=... , "
     "or by one with the token that stands in the site file."
 )
 
 
-def _headers(token: Iterable[tuple[bytes, bytes]]) -> dict[str, str]:
-    return {name.decode("latin-1").lower(): value.decode("latin-1") for name, value in token}
+def _headers(raw: Iterable[tuple[bytes, bytes]]) -> dict[str, str]:
+    return {name.decode("latin-1").lower(): value.decode("latin-1") for name, value in raw}
 
 
-def _name(host: str) -> str:
+def _without_port(host: str) -> str:
     """A host name without its port."""
     name, colon, port = host.rpartition(":")
     return name if colon and port.isdecimal() else host
 
 
-def _cookie(text: str) -> str:
+def _token_in_cookie(text: str) -> str:
     try:
         found = SimpleCookie(text).get(COOKIE)
     except CookieError:
@@ -136,27 +136,28 @@ def _cookie(text: str) -> str:
 async def _set_cookie(scope: Scope, send: Send, token: str) -> None:
     """Move the token from the address to a cookie that scripts cannot read."""
     cookie = f"{COOKIE}={token}; HttpOnly; SameSite=Strict; Path=/"
-    place = "/" + quote(
-        scope["path"].lstrip("/\\")
-    )  # two leading slashes would redirect to another host
-    headers = [(b"location", place.encode()), (b"set-cookie", cookie.encode())]
-    await send({"type": "http.response.start", "status": 303, "headers": [*headers, *_SAFE]})
+    # Two leading slashes would redirect to another host.
+    location = "/" + quote(scope["path"].lstrip("/\\"))
+    headers = [(b"location", location.encode()), (b"set-cookie", cookie.encode())]
+    await send(
+        {"type": "http.response.start", "status": 303, "headers": [*headers, *_SECURITY_HEADERS]}
+    )
     await send({"type": "http.response.body", "body": b""})
 
 
-async def _refuse(scope: Scope, send: Send, why: str, accepted: str) -> None:
+async def _refuse(scope: Scope, send: Send, reason: str, accept: str) -> None:
     if scope["type"] == "websocket":
-        await send({"type": "websocket.close", "code": 4403, "reason": why})
+        await send({"type": "websocket.close", "code": 4403, "reason": reason})
         return
-    page = "text/html" in accepted
+    page = "text/html" in accept
     kind = b"text/html" if page else b"text/plain"
-    headers = [(b"content-type", kind + b"; charset=utf-8"), *_SAFE]
-    body = plain_page("This console is closed to you", why) if page else why.encode()
+    headers = [(b"content-type", kind + b"; charset=utf-8"), *_SECURITY_HEADERS]
+    body = plain_page("This console is closed to you", reason) if page else reason.encode()
     await send({"type": "http.response.start", "status": 403, "headers": headers})
     await send({"type": "http.response.body", "body": body})
 
 
-_SAFE = (
+_SECURITY_HEADERS = (
     (b"referrer-policy", b"no-referrer"),
     (b"x-content-type-options", b"nosniff"),
     (b"cache-control", b"no-store"),

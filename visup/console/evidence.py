@@ -10,7 +10,7 @@ from pathlib import Path
 from visup.agent.storage.text_file import read_text_file
 from visup.runs.evidence.keeper import EVIDENCE, KEYS
 
-LARGEST_NOTE = 2**20
+MAX_RECORD_BYTES = 2**20
 """Maximum size of the record of an alert, bytes."""
 
 _SNAPSHOT = re.compile(r"alert-(\d{1,9})\.jpg")
@@ -23,12 +23,12 @@ class AlertEvidence:
     Attributes:
         snapshot: Its picture, or None.
         clip: Its clip, or None.
-        awaited: Whether a clip is still being recorded.
+        clip_pending: Whether a clip is still being recorded.
     """
 
     snapshot: Path | None = None
     clip: Path | None = None
-    awaited: bool = False
+    clip_pending: bool = False
 
     def __bool__(self) -> bool:
         return self.snapshot is not None or self.clip is not None
@@ -43,7 +43,7 @@ def evidence_of(run: Path, alert: int) -> AlertEvidence:
     """
     folder = run / EVIDENCE
     try:
-        record = json.loads(read_text_file(folder / f"alert-{alert}.json", LARGEST_NOTE))
+        record = json.loads(read_text_file(folder / f"alert-{alert}.json", MAX_RECORD_BYTES))
         snapshot, clip = (folder / Path(str(record[key])).name for key in KEYS)
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return AlertEvidence()
@@ -65,11 +65,11 @@ def latest_snapshot(run: Path) -> int | None:
     return max((n for n in numbers if evidence_of(run, n).snapshot), default=None)
 
 
-def _regular_file(path: Path, kind: str) -> Path | None:
+def _regular_file(path: Path, suffix: str) -> Path | None:
     """A regular file of the folder; links are refused, because they may lead anywhere."""
     try:
-        fine = path.suffix == kind and path.is_file() and not path.is_symlink()
-        fine = fine and not path.parent.is_symlink()
+        is_regular = path.suffix == suffix and path.is_file() and not path.is_symlink()
+        is_regular = is_regular and not path.parent.is_symlink()
     except OSError:
         return None
-    return path if fine else None
+    return path if is_regular else None

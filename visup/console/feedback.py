@@ -19,8 +19,8 @@ from visup.agent.model.errors import OutputError, SettingsError
 from visup.agent.storage.file_lock import only_writer
 
 FEEDBACK = "feedback.jsonl"
-LONGEST_NOTE = 500
-LARGEST_FILE = 2**22
+MAX_NOTE_LENGTH = 500
+MAX_FILE_BYTES = 2**22
 """Maximum size of a feedback file, bytes."""
 
 
@@ -55,7 +55,7 @@ class AlertFeedback:
 def read_feedback(folder: Path) -> dict[int, AlertFeedback]:
     """The latest feedback on each alert of a run; invalid lines are skipped."""
     path = folder / FEEDBACK
-    if not path.is_file() or path.stat().st_size > LARGEST_FILE:
+    if not path.is_file() or path.stat().st_size > MAX_FILE_BYTES:
         return {}
     found = {}
     for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
@@ -67,17 +67,17 @@ def read_feedback(folder: Path) -> dict[int, AlertFeedback]:
     return found
 
 
-def _feedback(line: Mapping[str, Any]) -> AlertFeedback:
+def _feedback(record: Mapping[str, Any]) -> AlertFeedback:
     return AlertFeedback(
-        int(line["alert"]),
-        str(line["kind"]),
-        Opinion(line["opinion"]),
-        str(line["note"])[:LONGEST_NOTE],
-        float(line["said"]),
+        int(record["alert"]),
+        str(record["kind"]),
+        Opinion(record["opinion"]),
+        str(record["note"])[:MAX_NOTE_LENGTH],
+        float(record["said"]),
     )
 
 
-def say(folder: Path, alert: Alert, opinion: Opinion, note: str = "") -> AlertFeedback:
+def store_feedback(folder: Path, alert: Alert, opinion: Opinion, note: str = "") -> AlertFeedback:
     """Store feedback on an alert.
 
     Args:
@@ -93,8 +93,8 @@ def say(folder: Path, alert: Alert, opinion: Opinion, note: str = "") -> AlertFe
     note = " ".join(note.split())
     if opinion is Opinion.MUTED and not note:
         raise SettingsError("muting an alert needs a reason", expected="a few words")
-    if len(note) > LONGEST_NOTE:
-        raise SettingsError("this note is too long", expected=f"at most {LONGEST_NOTE} letters")
+    if len(note) > MAX_NOTE_LENGTH:
+        raise SettingsError("this note is too long", expected=f"at most {MAX_NOTE_LENGTH} letters")
     feedback = AlertFeedback(alert.id, alert.kind, opinion, note, time.time())
     try:
         with (
@@ -128,8 +128,8 @@ class KindPrecision:
     @property
     def precision(self) -> float | None:
         """Share of confirmed alerts among those with feedback; None without feedback."""
-        judged = self.right + self.false
-        return self.right / judged if judged else None
+        rated = self.right + self.false
+        return self.right / rated if rated else None
 
 
 def precisions(
@@ -137,13 +137,13 @@ def precisions(
 ) -> tuple[KindPrecision, ...]:
     """The precision of each kind of alert over some runs, the most frequent first."""
     alerts: Counter[str] = Counter()
-    said: Counter[tuple[str, Opinion]] = Counter()
-    for opened, feedback in runs:
-        for a in opened:
+    counts: Counter[tuple[str, Opinion]] = Counter()
+    for run_alerts, feedback in runs:
+        for a in run_alerts:
             alerts[a.kind] += 1
             if a.id in feedback:
-                said[a.kind, feedback[a.id].opinion] += 1
+                counts[a.kind, feedback[a.id].opinion] += 1
     return tuple(
-        KindPrecision(kind, n, said[kind, Opinion.RIGHT], said[kind, Opinion.FALSE_ALARM])
+        KindPrecision(kind, n, counts[kind, Opinion.RIGHT], counts[kind, Opinion.FALSE_ALARM])
         for kind, n in alerts.most_common()
     )

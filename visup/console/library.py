@@ -12,11 +12,11 @@ from typing import Any
 from visup.agent.model.errors import OutputError, VisupError
 from visup.agent.storage.journal_reader import JOURNAL, Recording, is_run
 
-DEEPEST = 6
+MAX_DEPTH = 6
 """Search depth below the given folders."""
 
-MOST_RUNS = 10_000
-KEY_LETTERS = 16
+MAX_RUNS = 10_000
+KEY_LENGTH = 16
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,40 +60,40 @@ class RunLibrary:
     """The runs below some folders.
 
     Args:
-        places: Run folders, or folders of run folders.
+        roots: Run folders, or folders of run folders.
 
     Raises:
         OutputError: A folder does not exist or contains no run.
     """
 
-    places: Sequence[Path]
+    roots: Sequence[Path]
     _known: dict[str, Path] = field(default_factory=dict)
-    _over: dict[str, RunEntry] = field(default_factory=dict)
+    _ended_entries: dict[str, RunEntry] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for place in self.places:
-            if not place.is_dir():
+        for root in self.roots:
+            if not root.is_dir():
                 raise OutputError(
                     "there is no such folder",
-                    where=str(place),
+                    where=str(root),
                     expected="a run folder, or a folder of them",
                 )
         self.scan()
 
     def scan(self) -> tuple[RunEntry, ...]:
         """All present runs, latest first; new ones become known by their keys."""
-        self._known = {run_key(run): run for place in self.places for run in _runs_below(place)}
+        self._known = {run_key(run): run for root in self.roots for run in _runs_below(root)}
         found = [self._entry(key, run) for key, run in self._known.items()]
         return tuple(sorted(found, key=lambda e: (-e.written, e.name)))
 
     def _entry(self, key: str, run: Path) -> RunEntry:
         """The list entry of a run; an ended run is read again only if it was written to."""
-        cached = self._over.get(key)
+        cached = self._ended_entries.get(key)
         if cached is not None and cached.written == _written(run):
             return cached
         entry = entry_of(key, run)
         if entry.ended:
-            self._over[key] = entry
+            self._ended_entries[key] = entry
         return entry
 
     def folder(self, key: str) -> Path:
@@ -122,19 +122,19 @@ def _written(run: Path) -> float | None:
 def run_key(folder: Path) -> str:
     """The key of a run in URLs."""
     name = os.fsencode(folder.resolve())
-    return hashlib.sha256(name).hexdigest()[:KEY_LETTERS]
+    return hashlib.sha256(name).hexdigest()[:KEY_LENGTH]
 
 
-def _runs_below(place: Path) -> Iterator[Path]:
+def _runs_below(root: Path) -> Iterator[Path]:
     """Run folders, without following links out of the folder."""
-    found = 0
-    for at, folders, names in os.walk(place):
-        folder = Path(at)
+    count = 0
+    for path, folders, names in os.walk(root):
+        folder = Path(path)
         if JOURNAL in names and is_run(folder):
-            found += 1
+            count += 1
             yield folder
-        deep = len(folder.relative_to(place).parts)
-        folders[:] = sorted(folders) if deep < DEEPEST and found < MOST_RUNS else []
+        depth = len(folder.relative_to(root).parts)
+        folders[:] = sorted(folders) if depth < MAX_DEPTH and count < MAX_RUNS else []
 
 
 def entry_of(key: str, folder: Path) -> RunEntry:

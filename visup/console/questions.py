@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from visup.agent import Event, Question
 
 
-def questions_at(events: Iterable[Event], now: float) -> tuple[Question, ...]:
+def open_questions(events: Iterable[Event], now: float) -> tuple[Question, ...]:
     """The questions open at a time, by object.
 
     A journal does not record when a question settled by itself; here such a question stays open to the end.
@@ -16,13 +16,13 @@ def questions_at(events: Iterable[Event], now: float) -> tuple[Question, ...]:
         events: Events of the run, by time.
         now: Seconds.
     """
-    waiting: dict[int, Question] = {}
+    questions: dict[int, Question] = {}
     for e in events:
         if e.time > now or not e.objects:
             continue
         if e.kind == "question":
             names = tuple(map(str, e.data.get("names", ())))
-            waiting[e.objects[0]] = Question(e.objects[0], names, e.time, e.text)
+            questions[e.objects[0]] = Question(e.objects[0], names, e.time, e.text)
         elif e.kind in ("answer", "exit"):
-            waiting.pop(e.objects[0], None)
-    return tuple(waiting[number] for number in sorted(waiting))
+            questions.pop(e.objects[0], None)
+    return tuple(questions[number] for number in sorted(questions))

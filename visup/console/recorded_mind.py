@@ -58,7 +58,7 @@ def recorded_mind(
             objects=MappingProxyType({b.id: b for b in objects}),
             couplings=tuple(_coupling(c) for c in summary["couplings"]),
             tasks=tuple(_task(t) for t in summary["tasks"]),
-            alerts=tuple(a for a in alerts if open_at(a, observation.time)),
+            alerts=tuple(a for a in alerts if is_open_at(a, observation.time)),
             health=Health(
                 HealthStatus(summary["health"]["status"]), str(summary["health"]["detail"])
             ),
@@ -71,62 +71,62 @@ def recorded_mind(
         ) from fault
 
 
-def open_at(alert: Alert, time: float) -> bool:
+def is_open_at(alert: Alert, time: float) -> bool:
     """Whether an alert was open at a time, seconds."""
     return alert.opened <= time and (alert.closed is None or time < alert.closed)
 
 
 def _belief(
-    line: Mapping[str, Any], regions: Mapping[int, Region], observation: Observation
+    record: Mapping[str, Any], regions: Mapping[int, Region], observation: Observation
 ) -> ObjectBelief:
-    presence = Presence(line["presence"])
-    region = regions.get(line["region"]) if presence is Presence.SEEN else None
-    shares = [(str(name), float(share)) for name, share in line["candidates"]]
+    presence = Presence(record["presence"])
+    region = regions.get(record["region"]) if presence is Presence.SEEN else None
+    shares = [(str(name), float(share)) for name, share in record["candidates"]]
     return ObjectBelief(
-        int(line["id"]),
-        region or _box_region(line, observation.frame_size),
+        int(record["id"]),
+        region or _box_region(record, observation.frame_size),
         presence,
         first_seen=observation.time,
         last_seen=observation.time,
-        confirmed=bool(line["confirmed"]),
+        confirmed=bool(record["confirmed"]),
         candidates=tuple(Candidate(name, 0.0, share, share) for name, share in shares),
-        depth=None if line["depth"] is None else float(line["depth"]),
+        depth=None if record["depth"] is None else float(record["depth"]),
     )
 
 
-def _box_region(line: Mapping[str, Any], size: tuple[int, int]) -> Region:
+def _box_region(record: Mapping[str, Any], size: tuple[int, int]) -> Region:
     """The last seen region: its bounding box, since the outline is not recorded."""
-    x, y, w, h = (int(n) for n in line["bbox"])
+    x, y, w, h = (int(n) for n in record["bbox"])
     corners = [(x, y), (x + w - 1, y), (x + w - 1, y + h - 1), (x, y + h - 1)]
     return Region(
-        id=int(line["region"]),
+        id=int(record["region"]),
         bbox=(x, y, w, h),
         mask=np.zeros((max(0, min(h, size[1])), max(0, min(w, size[0]))), dtype=bool),
         contour=np.array(corners, np.float32),
         centroid=(x + w / 2, y + h / 2),
-        area=float(line["area"]),
-        velocity=(float(line["velocity"][0]), float(line["velocity"][1])),
-        cut=bool(line["cut"]),
+        area=float(record["area"]),
+        velocity=(float(record["velocity"][0]), float(record["velocity"][1])),
+        cut=bool(record["cut"]),
     )
 
 
-def _task(line: Mapping[str, Any]) -> TaskBelief:
-    sure = line.get("sure", {})
+def _task(record: Mapping[str, Any]) -> TaskBelief:
+    confidences = record.get("sure", {})
     stages = tuple(
-        StageBelief(str(n), Status(s), 0.0, float(sure.get(n, 1.0)))
-        for n, s in line["stages"].items()
+        StageBelief(str(n), Status(s), 0.0, float(confidences.get(n, 1.0)))
+        for n, s in record["stages"].items()
     )
-    success = line.get("success")
+    success = record.get("success")
     return TaskBelief(
-        str(line["task"]),
-        Verdict(line["verdict"]),
+        str(record["task"]),
+        Verdict(record["verdict"]),
         stages,
-        line["current"],
-        prospects=tuple(Prospect(str(n), float(p)) for n, p in line.get("next", ())),
+        record["current"],
+        prospects=tuple(Prospect(str(n), float(p)) for n, p in record.get("next", ())),
         success=None if success is None else float(success),
     )
 
 
-def _coupling(line: Mapping[str, Any]) -> Coupling:
-    a, b = line["objects"]
-    return Coupling((int(a), int(b)), float(line["since"]))
+def _coupling(record: Mapping[str, Any]) -> Coupling:
+    a, b = record["objects"]
+    return Coupling((int(a), int(b)), float(record["since"]))

@@ -1,4 +1,4 @@
-"""What a run was given that the console draws: the flows of its tasks, and its zones."""
+"""Files that a run names and the console draws: its tasks as flow charts, and its zones."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from visup.tasks.tools.diagram import Flow, flow_of
 
 
 def flows_of(settings: WatchSettings | None) -> Mapping[str, Flow]:
-    """Task -> its flow; of tasks whose files are not there any more, none."""
+    """Task -> its flow; tasks whose files no longer exist are left out."""
     found: dict[str, Flow] = {}
-    for place in settings.tasks if settings else ():
+    for name in settings.tasks if settings else ():
         try:
-            found |= {task.name: flow_of(task) for task in load_tasks(place)}
+            found |= {task.name: flow_of(task) for task in load_tasks(name)}
         except VisupError:
             continue
     return found
 
 
 def zones_of(settings: WatchSettings | None) -> tuple[Zone, ...]:
-    """The zones of a run; none where their file is not there any more."""
+    """The zones of a run; none if their file no longer exists."""
     try:
         return load_zones(settings.zones) if settings and settings.zones else ()
     except VisupError:

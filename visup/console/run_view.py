@@ -29,24 +29,24 @@ from visup.report.annotate import annotate
 from visup.runs.settings import WatchSettings
 from visup.tasks.tools.diagram import Flow
 
-KEPT_MOMENTS = 64
-THUMBNAIL = 224
+MAX_CACHED_MOMENTS = 64
+THUMBNAIL_WIDTH = 224
 """Width of a thumbnail, pixels."""
 
 TRAIL_S = 4.0
 """Length of a trail, seconds."""
 
-MOST_TRAIL = 60
+MAX_TRAIL_POINTS = 60
 """Maximum number of moments in a trail."""
 
-LOOKED_BACK = 20
+MATCH_LOOKBACK = 20
 """How many moments back to search for the last match of an object."""
 
-MOST_SAMPLES = 240
+MAX_SAMPLES = 240
 """Maximum number of samples for a curve or row."""
 
 
-CARRIED = ("pictures", "settings", "models", "flows", "zones")
+KEPT_ATTRIBUTES = ("pictures", "settings", "models", "flows", "zones")
 """What stays the same while a run grows."""
 
 
@@ -55,7 +55,7 @@ class RunView:
 
     Args:
         folder: Folder of the run.
-        before: An earlier view of the same run: only what was written since is read.
+        previous: An earlier view of the same run: only what was written since is read.
 
     Attributes:
         folder: The same.
@@ -66,24 +66,24 @@ class RunView:
         OutputError: It cannot be read.
     """
 
-    def __init__(self, folder: Path, before: RunView | None = None) -> None:
+    def __init__(self, folder: Path, previous: RunView | None = None) -> None:
         self.folder = folder
         self._run = open_run(folder)
-        self.frames: list[int] = list(before.frames) if before else []
-        self.times: list[float] = list(before.times) if before else []
+        self.frames: list[int] = list(previous.frames) if previous else []
+        self.times: list[float] = list(previous.times) if previous else []
         moments = list(self._run.recording.moments(self.frames[-1] if self.frames else -1))
         self.frames += [frame for frame, _ in moments]
         self.times += [time for _, time in moments]
-        if before is not None:
-            self.__dict__ |= {k: v for k, v in before.__dict__.items() if k in CARRIED}
+        if previous is not None:
+            self.__dict__ |= {k: v for k, v in previous.__dict__.items() if k in KEPT_ATTRIBUTES}
         self._moments: OrderedDict[int, tuple[Mind, Observation]] = OrderedDict()
         self._lock = Lock()
 
     def refreshed(self) -> RunView:
         """This run, read on if it has grown or ended."""
         ends = self._run.recording.first_and_last()
-        same = ends is None or (bool(self.frames) and ends[1] == self.frames[-1])
-        if same and (self.ended or "ended" not in self._run.recording.facts()):
+        unchanged = ends is None or (bool(self.frames) and ends[1] == self.frames[-1])
+        if unchanged and (self.ended or "ended" not in self._run.recording.facts()):
             return self
         return RunView(self.folder, self if self._continues() else None)
 
@@ -107,8 +107,8 @@ class RunView:
     @property
     def source(self) -> str:
         """The source."""
-        told = self._run.facts.get("source")
-        return told if isinstance(told, str) else ""
+        source = self._run.facts.get("source")
+        return source if isinstance(source, str) else ""
 
     @property
     def seconds(self) -> float:
@@ -135,19 +135,19 @@ class RunView:
         """The wall clock of the run; empty for a run without a camera."""
         return WallClock.read(self._run.facts.get("clock"))
 
-    def when(self, time: float) -> str:
+    def time_text(self, time: float) -> str:
         """A time for pages: in UTC if known, with the date if it differs from the last day."""
-        told, last = self.clock.text(time), self.clock.text(self.seconds)
-        if told is None or last is None:
+        text, last = self.clock.text(time), self.clock.text(self.seconds)
+        if text is None or last is None:
             return clock_text(time)
-        return told[11:19] if told[:10] == last[:10] else f"{told[5:10]} {told[11:19]}"
+        return text[11:19] if text[:10] == last[:10] else f"{text[5:10]} {text[11:19]}"
 
-    def now(self, time: float) -> str:
+    def cursor_text(self, time: float) -> str:
         """The time of the cursor for pages."""
-        told = self.clock.text(time)
-        if told is None:
+        text = self.clock.text(time)
+        if text is None:
             return f"{clock_text(time)} / {clock_text(self.seconds)}"
-        return f"{told[:10]} {told[11:19]} UTC"
+        return f"{text[:10]} {text[11:19]} UTC"
 
     @cached_property
     def events(self) -> tuple[Event, ...]:
@@ -162,9 +162,9 @@ class RunView:
     @cached_property
     def tracks(self) -> tuple[TimelineTrack, ...]:
         """The rows of the timeline."""
-        told = tracks_of(self.events, self.alerts, self.seconds, self.actors)
-        states = ((t, _states(told)) for t, told in self._samples())
-        return (*told, *behaviour_tracks(states, self.seconds))
+        rows = tracks_of(self.events, self.alerts, self.seconds, self.actors)
+        states = ((t, _states(rows)) for t, rows in self._samples())
+        return (*rows, *behaviour_tracks(states, self.seconds))
 
     @cached_property
     def pictures(self) -> RunPictures:
@@ -186,8 +186,8 @@ class RunView:
         Raises:
             DatabaseError: They cannot be read.
         """
-        named = self.settings.models if self.settings else None
-        return ModelDatabase.open(named) if named else None
+        path = self.settings.models if self.settings else None
+        return ModelDatabase.open(path) if path else None
 
     @cached_property
     def flows(self) -> Mapping[str, Flow]:
@@ -204,11 +204,11 @@ class RunView:
         """Actor -> models."""
         return dict(self.settings.actors) if self.settings else {}
 
-    def at(self, time: float) -> int:
+    def moment_at(self, time: float) -> int:
         """Number of the last moment not after a time, from 0; the first if all are later."""
         return max(0, bisect_right(self.times, time + 1e-6) - 1)
 
-    def of_frame(self, frame: int) -> int:
+    def moment_of_frame(self, frame: int) -> int:
         """Number of the last moment whose frame is not after the given one."""
         return max(0, bisect_right(self.frames, frame) - 1)
 
@@ -225,44 +225,44 @@ class RunView:
             raise OutputError("nothing has been processed in this run yet", where=str(self.folder))
         with self._lock:
             if number not in self._moments:
-                told, seen = self._run.recording.step_at(self.frames[number])
-                mind = recorded_mind(told, seen, self.alerts, self.actors)
-                self._moments[number] = replace(mind, zones=self.zones), seen
-                while len(self._moments) > KEPT_MOMENTS:
+                summary, observation = self._run.recording.step_at(self.frames[number])
+                mind = recorded_mind(summary, observation, self.alerts, self.actors)
+                self._moments[number] = replace(mind, zones=self.zones), observation
+                while len(self._moments) > MAX_CACHED_MOMENTS:
                     self._moments.popitem(last=False)
             return self._moments[number]
 
-    def looks(self, number: int, object_id: int) -> tuple[Hypothesis, ...]:
+    def matches(self, number: int, object_id: int) -> tuple[Hypothesis, ...]:
         """The latest matches of an object, best first; empty if there are none."""
-        return self.last_look(number, object_id)[1]
+        return self.last_match(number, object_id)[1]
 
-    def last_look(self, number: int, object_id: int) -> tuple[int | None, tuple[Hypothesis, ...]]:
+    def last_match(self, number: int, object_id: int) -> tuple[int | None, tuple[Hypothesis, ...]]:
         """Frame of the last match of an object, or None, and its result."""
-        for at in range(number, max(-1, number - LOOKED_BACK), -1):
-            mind, seen = self._moment(at)
+        for moment in range(number, max(-1, number - MATCH_LOOKBACK), -1):
+            mind, observation = self._moment(moment)
             belief = mind.objects.get(object_id)
             region = belief.region.id if belief else None
-            found = [h for h in seen.of("hypothesis") if h.region_id == region]
+            found = [h for h in observation.of("hypothesis") if h.region_id == region]
             if found:
-                return at, tuple(sorted(found, key=lambda h: -h.similarity))
+                return moment, tuple(sorted(found, key=lambda h: -h.similarity))
         return None, ()
 
     def trails(self, number: int) -> Mapping[int, list[tuple[float, float]]]:
         """The trails of visible objects before a moment: centres of their boxes, pixels."""
-        begin = self.at(self.times[number] - TRAIL_S)
-        sampled = set(self.frames[number : begin : -(1 + (number - begin) // MOST_TRAIL)])
+        begin = self.moment_at(self.times[number] - TRAIL_S)
+        sampled = set(self.frames[number : begin : -(1 + (number - begin) // MAX_TRAIL_POINTS)])
         found: dict[int, list[tuple[float, float]]] = {}
-        for told in self._run.recording.summaries(self.frames[begin], self.frames[number]):
-            for line in told["objects"] if told["frame_index"] in sampled else ():
+        for summary in self._run.recording.summaries(self.frames[begin], self.frames[number]):
+            for line in summary["objects"] if summary["frame_index"] in sampled else ():
                 if line["presence"] == "seen" and line["confirmed"]:
                     x, y, w, h = line["bbox"]
                     found.setdefault(line["id"], []).append((x + w / 2, y + h / 2))
-        here = {b.id for b in self.mind(number).present()}
-        return {i: points for i, points in found.items() if i in here and len(points) > 1}
+        in_view = {b.id for b in self.mind(number).present()}
+        return {i: points for i, points in found.items() if i in in_view and len(points) > 1}
 
     def picture(self, number: int, *, plain: bool = False) -> bytes:
         """A moment as JPEG."""
-        return self.pictures.drawn(self.mind(number), plain=plain)
+        return self.pictures.annotated(self.mind(number), plain=plain)
 
     def thumbnail(self) -> bytes:
         """A thumbnail of the middle of the run, or of a camera's latest alert, as JPEG."""
@@ -270,8 +270,8 @@ class RunView:
         if image is None:
             mind = self.mind(len(self.frames) // 2)
             image = annotate(self.pictures.frame(mind), mind)
-        height = round(image.shape[0] * THUMBNAIL / image.shape[1])
-        size = (THUMBNAIL, max(1, height))
+        height = round(image.shape[0] * THUMBNAIL_WIDTH / image.shape[1])
+        size = (THUMBNAIL_WIDTH, max(1, height))
         return jpeg(cv2.resize(image, size, interpolation=cv2.INTER_AREA).astype(np.uint8))
 
     def _alert_picture(self) -> NDArray[np.uint8] | None:
@@ -281,10 +281,10 @@ class RunView:
         image = None if path is None else cv2.imread(str(path))
         return None if image is None else np.asarray(image, np.uint8)
 
-    def shares(self, object_id: int) -> Iterator[tuple[float, Mapping[str, float]]]:
+    def identity_shares(self, object_id: int) -> Iterator[tuple[float, Mapping[str, float]]]:
         """The identity votes of an object over time: time, and name -> share of the votes."""
-        for time, told in self._samples():
-            for line in told.get("objects", ()):
+        for time, summary in self._samples():
+            for line in summary.get("objects", ()):
                 if line.get("id") == object_id:
                     yield time, {str(n): float(s) for n, s in line["candidates"]}
 
@@ -293,9 +293,9 @@ class RunView:
 
         An approximation for runs of days: shorter changes may be missed. Unreadable moments are left out.
         """
-        step = max(1, -(-len(self.frames) // MOST_SAMPLES))
-        for told in self._run.recording.summaries_of(self.frames[::step]):
-            yield float(told["time"]), told
+        step = max(1, -(-len(self.frames) // MAX_SAMPLES))
+        for summary in self._run.recording.summaries_of(self.frames[::step]):
+            yield float(summary["time"]), summary
 
 
 def clock_text(seconds: float) -> str:
@@ -307,8 +307,8 @@ def clock_text(seconds: float) -> str:
     return f"{hours}:{minutes:02d}:{tail}" if hours else f"{minutes}:{tail}"
 
 
-def _states(told: Mapping[str, Any]) -> Mapping[str, str]:
+def _states(summary: Mapping[str, Any]) -> Mapping[str, str]:
     """Behaviour -> its state in a step."""
-    found = told.get("behaviours")
+    found = summary.get("behaviours")
     rows = found.items() if isinstance(found, Mapping) else ()
-    return {str(name): str(said[0]) for name, said in rows if isinstance(said, list) and said}
+    return {str(name): str(entry[0]) for name, entry in rows if isinstance(entry, list) and entry}

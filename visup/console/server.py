@@ -14,34 +14,34 @@ from nicegui import app as nicegui_app
 from nicegui import ui
 
 from visup.agent.model.errors import SettingsError, VisupError
-from visup.console.access import WHO, Access, AccessGuard, ConsoleRole
+from visup.console.access import ROLE_KEY, Access, AccessGuard, ConsoleRole
 from visup.console.evidence import evidence_of
 from visup.console.pages.library_page import library_page
 from visup.console.pages.run_page import run_page
 from visup.console.pages.wall_page import wall_page
 from visup.console.plain_page import plain_page
-from visup.console.reasoning.likeness import likeness_picture
+from visup.console.reasoning.view_comparison import view_comparison_picture
 from visup.console.state import ConsoleState
 
 FAVICON = "◉"
-CLOSING_S = 1
+SHUTDOWN_TIMEOUT_S = 1
 """How long open pages may delay the shutdown, seconds."""
 
-_PICTURE = {"Cache-Control": "private, max-age=60", "X-Content-Type-Options": "nosniff"}
-_KINDS = {"jpg": "image/jpeg", "webm": "video/webm"}
+_IMAGE_HEADERS = {"Cache-Control": "private, max-age=60", "X-Content-Type-Options": "nosniff"}
+_MEDIA_TYPES = {"jpg": "image/jpeg", "webm": "video/webm"}
 
 
 def build_application(state: ConsoleState, access: Access) -> AccessGuard:
     """Build the application; at most one per process, since NiceGUI's pages are global."""
     app = FastAPI(openapi_url=None, docs_url=None, redoc_url=None)
-    _pictures(app, state)
-    _pages(state)
+    _add_image_routes(app, state)
+    _add_pages(state)
     nicegui_app.add_exception_handler(404, _no_such_page)
     ui.run_with(app, title="visup", favicon=FAVICON, dark=None, show_welcome_message=False)
     return AccessGuard(app, access)
 
 
-def _pictures(app: FastAPI, state: ConsoleState) -> None:
+def _add_image_routes(app: FastAPI, state: ConsoleState) -> None:
     """Serve pictures; they are drawn in threads, so that a large one does not block the pages."""
 
     @app.get("/picture/{key}/{number}.jpg")
@@ -54,30 +54,30 @@ def _pictures(app: FastAPI, state: ConsoleState) -> None:
 
     @app.get("/likeness/{key}/{number}/{object_id}.jpg")
     def likeness(key: str, number: int, object_id: int) -> Response:
-        return _jpeg(lambda: likeness_picture(state.view(key), number, object_id))
+        return _jpeg(lambda: view_comparison_picture(state.view(key), number, object_id))
 
     @app.get("/evidence/{key}/{alert}.{kind}")
     def evidence(key: str, alert: int, kind: Literal["jpg", "webm"]) -> Response:
         try:
-            kept = evidence_of(state.library.folder(key), alert)
+            files = evidence_of(state.library.folder(key), alert)
         except VisupError as fault:
             raise HTTPException(404, str(fault)) from fault
-        path = kept.snapshot if kind == "jpg" else kept.clip
+        path = files.snapshot if kind == "jpg" else files.clip
         if path is None:
             raise HTTPException(404, "There is no such picture or clip (any more).")
-        return FileResponse(path, media_type=_KINDS[kind], headers=_PICTURE)
+        return FileResponse(path, media_type=_MEDIA_TYPES[kind], headers=_IMAGE_HEADERS)
 
 
 def _jpeg(draw: Callable[[], bytes]) -> Response:
     try:
-        return Response(draw(), media_type="image/jpeg", headers=_PICTURE)
+        return Response(draw(), media_type="image/jpeg", headers=_IMAGE_HEADERS)
     except VisupError as fault:
         raise HTTPException(404, str(fault)) from fault
 
 
-def _pages(state: ConsoleState) -> None:
+def _add_pages(state: ConsoleState) -> None:
     @ui.page("/")
-    def listed() -> None:
+    def run_list() -> None:
         library_page(state)
 
     @ui.page("/wall")
@@ -85,7 +85,7 @@ def _pages(state: ConsoleState) -> None:
         wall_page(state, _role(request))
 
     @ui.page("/run/{key}")
-    def one(request: Request, key: str, t: float = 0.0) -> None:
+    def one_run(request: Request, key: str, t: float = 0.0) -> None:
         run_page(state, key, _role(request), t)
 
 
@@ -95,7 +95,7 @@ async def _no_such_page(request: Request, fault: Exception) -> Response:
 
 
 def _role(request: Request) -> ConsoleRole:
-    role: ConsoleRole = request.scope.get(WHO, ConsoleRole.VIEWER)
+    role: ConsoleRole = request.scope.get(ROLE_KEY, ConsoleRole.VIEWER)
     return role
 
 
@@ -115,30 +115,30 @@ def serve_console(
         SettingsError: It cannot listen there.
     """
     application = build_application(state, access)
-    with _listening(host, port) as listening:
-        chosen = listening.getsockname()[1]
+    with _bound_socket(host, port) as bound:
+        actual_port = bound.getsockname()[1]
         name = f"[{host}]" if ":" in host else host
         settings = uvicorn.Config(
             application,
             log_level=logging.WARNING,
             lifespan="on",
-            timeout_graceful_shutdown=CLOSING_S,
+            timeout_graceful_shutdown=SHUTDOWN_TIMEOUT_S,
         )
         server = uvicorn.Server(settings)
-        ready(f"http://{name}:{chosen}/?token={access.operator}")
-        server.run(sockets=[listening])
+        ready(f"http://{name}:{actual_port}/?token={access.operator}")
+        server.run(sockets=[bound])
 
 
-def _listening(host: str, port: int) -> socket.socket:
+def _bound_socket(host: str, port: int) -> socket.socket:
     try:
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
-        made = socket.socket(family, socket.SOCK_STREAM)
-        made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        made.bind((host, port))
-        made.listen()  # requests may come as soon as the address is announced
+        sock = socket.socket(family, socket.SOCK_STREAM)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        sock.bind((host, port))
+        sock.listen()  # requests may come as soon as the address is announced
     except (OSError, OverflowError) as fault:
         raise SettingsError(
             f"the console cannot listen at {host}:{port} ({fault})",
             hint="give another --port, or --port 0 for any that is free",
         ) from fault
-    return made
+    return sock

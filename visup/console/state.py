@@ -14,8 +14,8 @@ from visup.console.library import RunLibrary
 from visup.console.reasoning.inquiry import Inquiry
 from visup.console.run_view import RunView
 
-MOST_VIEWS = 16
-MOST_INQUIRIES = 4
+MAX_VIEWS = 16
+MAX_INQUIRIES = 4
 """Inquiries hold all minds of a run, so only a few are cached."""
 
 Cached = TypeVar("Cached")
@@ -35,7 +35,7 @@ class ConsoleState:
         self.library, self.save_to = library, save_to
         self._views: OrderedDict[RunIdentity, RunView] = OrderedDict()
         self._inquiries: OrderedDict[RunIdentity, Inquiry] = OrderedDict()
-        self._lock, self._asking = Lock(), Lock()
+        self._lock, self._inquiry_lock = Lock(), Lock()
 
     def view(self, key: str, *, refresh: bool = False) -> RunView:
         """The view of a run.
@@ -50,7 +50,7 @@ class ConsoleState:
         with self._lock:
             folder = self.library.folder(key)
             identity = _identity(folder)
-            view = _cached(self._views, identity, lambda: RunView(folder), MOST_VIEWS)
+            view = _cached(self._views, identity, lambda: RunView(folder), MAX_VIEWS)
             if refresh:
                 view = self._views[identity] = view.refreshed()
             return view
@@ -63,13 +63,13 @@ class ConsoleState:
         """
         with self._lock:
             folder = self.library.folder(key)
-        with self._asking:  # loads tasks, rules and models without blocking other pages
+        with self._inquiry_lock:  # loads tasks, rules and models without blocking other pages
             return _cached(
-                self._inquiries, _identity(folder), lambda: _opened(folder), MOST_INQUIRIES
+                self._inquiries, _identity(folder), lambda: _open_inquiry(folder), MAX_INQUIRIES
             )
 
 
-def _opened(folder: Path) -> Inquiry:
+def _open_inquiry(folder: Path) -> Inquiry:
     """The inquiry of a run; errors quote no line of files named only by its folder.
 
     A folder from a stranger may name any file as its task.
@@ -91,12 +91,15 @@ def _identity(folder: Path) -> RunIdentity:
 
 
 def _cached(
-    cache: OrderedDict[RunIdentity, Cached], key: RunIdentity, make: Callable[[], Cached], most: int
+    cache: OrderedDict[RunIdentity, Cached],
+    key: RunIdentity,
+    make: Callable[[], Cached],
+    max_size: int,
 ) -> Cached:
     """An entry of an LRU cache, created if missing; the least recently used are evicted."""
     if key not in cache:
         cache[key] = make()
     cache.move_to_end(key)
-    while len(cache) > most:
+    while len(cache) > max_size:
         cache.popitem(last=False)
     return cache[key]

@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 from visup.agent import Alert, Event, Severity, Status
 
-PRESENCE: Mapping[str, str] = MappingProxyType(
+PRESENCE_OF_EVENT: Mapping[str, str] = MappingProxyType(
     {
         "entry": "seen",
         "noticed": "seen",
@@ -21,10 +21,10 @@ PRESENCE: Mapping[str, str] = MappingProxyType(
 )
 """Kind of event -> presence of its object from then on, as in `visup.agent.Presence`."""
 
-NOTHING = ("left", "pending")
+STATES_WITHOUT_BAR = ("left", "pending")
 """States without a bar."""
 
-MOST_OBJECTS = 40
+MAX_OBJECTS = 40
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,8 +79,8 @@ def tracks_of(
         Stages by their beginning, then alerts by kind, the objects longest in view, health.
     """
     ordered = tuple(events)
-    several = len({e.data.get("task") for e in ordered if _status(e)}) > 1
-    stages = _rows("stage", _stage_changes(ordered, several=several), seconds)
+    several_tasks = len({e.data.get("task") for e in ordered if _status(e)}) > 1
+    stages = _rows("stage", _stage_changes(ordered, several_tasks=several_tasks), seconds)
     objects = _rows("object", _presence_changes(ordered, actors), seconds)
     health = _rows("health", _health_changes(ordered), seconds)
     return (*stages, *_alert_rows(alerts, seconds), *_longest(objects), *health)
@@ -110,11 +110,11 @@ Change = tuple[str, int | None, float, str, str]
 """Label, object, seconds, state from then on, and text."""
 
 
-def _stage_changes(events: Sequence[Event], *, several: bool) -> Iterator[Change]:
+def _stage_changes(events: Sequence[Event], *, several_tasks: bool) -> Iterator[Change]:
     for e in events:
         if status := _status(e):
             stage = str(e.data.get("stage", ""))
-            label = f"{e.data.get('task')}: {stage}" if several else stage
+            label = f"{e.data.get('task')}: {stage}" if several_tasks else stage
             yield label, None, e.time, status, e.text
 
 
@@ -132,17 +132,27 @@ def _presence_changes(
 ) -> Iterator[Change]:
     names = _last_names(events, actors)
     for e in events:
-        if e.kind in PRESENCE and e.objects:
+        if e.kind in PRESENCE_OF_EVENT and e.objects:
             number = e.objects[0]
-            yield names.get(number, f"object {number}"), number, e.time, PRESENCE[e.kind], e.text
+            yield (
+                names.get(number, f"object {number}"),
+                number,
+                e.time,
+                PRESENCE_OF_EVENT[e.kind],
+                e.text,
+            )
 
 
 def _last_names(events: Sequence[Event], actors: Mapping[str, Sequence[str]]) -> dict[int, str]:
     """The last identity of each object."""
-    called = {model: actor for actor, models in sorted(actors.items()) for model in models}
+    actor_of_model = {model: actor for actor, models in sorted(actors.items()) for model in models}
     identifications = (e for e in events if e.kind in ("identified", "answer") and e.objects)
     last = {e.objects[0]: str(e.data.get("name") or "") for e in identifications}
-    return {number: f"{number} {called.get(name, name)}" for number, name in last.items() if name}
+    return {
+        number: f"{number} {actor_of_model.get(name, name)}"
+        for number, name in last.items()
+        if name
+    }
 
 
 def _health_changes(events: Sequence[Event]) -> Iterator[Change]:
@@ -161,7 +171,7 @@ def _rows(group: str, changes: Iterable[Change], seconds: float) -> Iterator[Tim
             spans[-1] = replace(spans[-1], end=time)
         spans.append(TrackSpan(time, seconds, state, text))
     for (label, number), spans in rows.items():
-        shown = tuple(s for s in spans if s.state not in NOTHING)
+        shown = tuple(s for s in spans if s.state not in STATES_WITHOUT_BAR)
         if shown:
             yield TimelineTrack(group, label, shown, number)
 
@@ -180,5 +190,5 @@ def _alert_rows(alerts: Iterable[Alert], seconds: float) -> Iterator[TimelineTra
 def _longest(rows: Iterable[TimelineTrack]) -> list[TimelineTrack]:
     """The objects longest in view, in the order of their first appearance."""
     found = list(rows)
-    stayed = sorted(found, key=lambda t: -sum(s.end - s.start for s in t.spans))[:MOST_OBJECTS]
-    return [track for track in found if track in stayed]
+    longest = sorted(found, key=lambda t: -sum(s.end - s.start for s in t.spans))[:MAX_OBJECTS]
+    return [track for track in found if track in longest]

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 from visup.tasks.tools.diagram import BEGIN, END, Flow
 
-WIDTH = 440.0
-WIDEST = 250.0
-NARROWEST = 120.0
-GAP = 14.0
+MIN_CHART_WIDTH = 440.0
+MAX_BOX_WIDTH = 250.0
+MIN_BOX_WIDTH = 120.0
+COLUMN_GAP = 14.0
 ROW_GAP = 26.0
-LINE = 15.0
-PAD = 8.0
-DOT = 14.0
+LINE_HEIGHT = 15.0
+PADDING = 8.0
+DOT_SIZE = 14.0
 """Size of the dots for beginning and end."""
 
 MARGIN = 46.0
@@ -48,14 +48,14 @@ class FlowLayout:
 
     Attributes:
         boxes: Node -> box.
-        back: Back edges.
+        back_edges: Back edges.
         rank: Node -> number of its row.
         width: Total width.
         height: Total height.
     """
 
     boxes: Mapping[str, FlowBox]
-    back: frozenset[Edge]
+    back_edges: frozenset[Edge]
     rank: Mapping[str, int]
     width: float
     height: float
@@ -64,58 +64,62 @@ class FlowLayout:
 def layout_of(flow: Flow) -> FlowLayout:
     """Lay out a flow: each box is below its predecessors, except for back edges."""
     nodes = [BEGIN, *flow.nodes, END]
-    back = _back_edges(nodes, flow.edges)
-    rank = _ranks(nodes, [e for e in flow.edges if e not in back])
+    back_edges = _back_edges(nodes, flow.edges)
+    rank = _ranks(nodes, [e for e in flow.edges if e not in back_edges])
     last = 1 + max((rank[n] for n in flow.nodes), default=0)
     rank[END] = max(last, rank[END])
     rows = [[n for n in nodes if rank[n] == r] for r in sorted(set(rank.values()))]
-    most = max(len(row) for row in rows)
-    width = max(WIDTH, 2 * MARGIN + most * (NARROWEST + GAP) - GAP)
+    most_columns = max(len(row) for row in rows)
+    width = max(
+        MIN_CHART_WIDTH, 2 * MARGIN + most_columns * (MIN_BOX_WIDTH + COLUMN_GAP) - COLUMN_GAP
+    )
     boxes: dict[str, FlowBox] = {}
-    y = PAD
+    y = PADDING
     for row in rows:
-        tall = max(_height(flow, n) for n in row)
+        height = max(_height(flow, n) for n in row)
         boxes |= {b.node: b for b in _row(flow, row, y, width)}
-        y += tall + ROW_GAP
-    return FlowLayout(boxes, back, rank, width, y - ROW_GAP + PAD)
+        y += height + ROW_GAP
+    return FlowLayout(boxes, back_edges, rank, width, y - ROW_GAP + PADDING)
 
 
 def _row(flow: Flow, row: list[str], y: float, width: float) -> Iterable[FlowBox]:
-    room = (width - 2 * MARGIN + GAP) / len(row)
-    each = min(WIDEST, room - GAP)
-    left = width / 2 - (each * len(row) + GAP * (len(row) - 1)) / 2
+    slot_width = (width - 2 * MARGIN + COLUMN_GAP) / len(row)
+    box_width = min(MAX_BOX_WIDTH, slot_width - COLUMN_GAP)
+    left = width / 2 - (box_width * len(row) + COLUMN_GAP * (len(row) - 1)) / 2
     for k, node in enumerate(row):
-        wide = each if node in flow.nodes else DOT
-        x = left + k * (each + GAP) + (each - wide) / 2
-        yield FlowBox(node, x, y, wide, _height(flow, node))
+        node_width = box_width if node in flow.nodes else DOT_SIZE
+        x = left + k * (box_width + COLUMN_GAP) + (box_width - node_width) / 2
+        yield FlowBox(node, x, y, node_width, _height(flow, node))
 
 
 def _height(flow: Flow, node: str) -> float:
     if node not in flow.nodes:
-        return DOT
-    return 2 * PAD + LINE * len(flow.nodes[node].lines) + 6
+        return DOT_SIZE
+    return 2 * PADDING + LINE_HEIGHT * len(flow.nodes[node].lines) + 6
 
 
 def _back_edges(nodes: list[str], edges: Iterable[Edge]) -> frozenset[Edge]:
     """Back edges: arrows to a box on the current path of a depth-first search."""
-    after: dict[str, list[str]] = {n: [] for n in nodes}
+    successors: dict[str, list[str]] = {n: [] for n in nodes}
     for a, b in edges:
-        after[a].append(b)
+        successors[a].append(b)
     done: set[str] = set()
     back: set[Edge] = set()
-    for first in nodes:
-        way: list[tuple[str, list[str]]] = [] if first in done else [(first, list(after[first]))]
-        while way:
-            here, left = way[-1]
-            if not left:
-                done.add(here)
-                way.pop()
+    for start in nodes:
+        path: list[tuple[str, list[str]]] = (
+            [] if start in done else [(start, list(successors[start]))]
+        )
+        while path:
+            node, remaining = path[-1]
+            if not remaining:
+                done.add(node)
+                path.pop()
                 continue
-            there = left.pop(0)
-            if there in (n for n, _ in way):
-                back.add((here, there))
-            elif there not in done:
-                way.append((there, list(after[there])))
+            successor = remaining.pop(0)
+            if successor in (n for n, _ in path):
+                back.add((node, successor))
+            elif successor not in done:
+                path.append((successor, list(successors[successor])))
     return frozenset(back)
 
 

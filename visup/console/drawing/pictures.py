@@ -16,8 +16,8 @@ from visup.report.annotate import annotate
 from visup.runs.replay_report import GREY
 from visup.teaching.clip_frames import ClipFrames
 
-QUALITY = 85
-KEPT_PICTURES = 32
+JPEG_QUALITY = 85
+MAX_CACHED_PICTURES = 32
 Picture = NDArray[np.uint8]
 
 
@@ -35,8 +35,8 @@ class RunPictures:
     """
 
     def __init__(self, source: str) -> None:
-        self._lock, self._frames = Lock(), None
-        self._drawing, self._drawn = Lock(), OrderedDict[tuple[int, bool], bytes]()
+        self._frames_lock, self._frames = Lock(), None
+        self._cache_lock, self._cache = Lock(), OrderedDict[tuple[int, bool], bytes]()
         self.problem = ""
         path = Path(source)
         if not source or not (path.is_file() or path.is_dir()):
@@ -53,34 +53,34 @@ class RunPictures:
         Returns:
             (H, W, 3) uint8 BGR, of the size that was processed.
         """
-        found = self.source_frame(mind)
-        return np.full((*mind.frame_size[::-1], 3), GREY, np.uint8) if found is None else found
+        frame = self.source_frame(mind)
+        return np.full((*mind.frame_size[::-1], 3), GREY, np.uint8) if frame is None else frame
 
     def source_frame(self, mind: Mind) -> Picture | None:
         """The frame of a moment, or None; (H, W, 3) uint8 BGR."""
         if self._frames is None:
             return None
         try:
-            with self._lock:
-                found = self._frames.at(mind.frame_index)
+            with self._frames_lock:
+                frame = self._frames.at(mind.frame_index)
         except SourceError as fault:
             self.problem = str(fault)
             return None
-        return found if found.shape[:2] == mind.frame_size[::-1] else None
+        return frame if frame.shape[:2] == mind.frame_size[::-1] else None
 
-    def drawn(self, mind: Mind, *, plain: bool = False) -> bytes:
+    def annotated(self, mind: Mind, *, plain: bool = False) -> bytes:
         """A moment as JPEG, with the beliefs drawn over it unless `plain`.
 
         Pages that follow a run ask for the same moments, so the last ones are kept.
         """
-        which = mind.frame_index, plain
-        with self._drawing:
-            if which not in self._drawn:
+        key = mind.frame_index, plain
+        with self._cache_lock:
+            if key not in self._cache:
                 image = self.frame(mind)
-                self._drawn[which] = jpeg(image if plain else annotate(image, mind))
-                if len(self._drawn) > KEPT_PICTURES:
-                    self._drawn.popitem(last=False)
-            return self._drawn[which]
+                self._cache[key] = jpeg(image if plain else annotate(image, mind))
+                if len(self._cache) > MAX_CACHED_PICTURES:
+                    self._cache.popitem(last=False)
+            return self._cache[key]
 
 
 def jpeg(image: Picture) -> bytes:
@@ -89,4 +89,4 @@ def jpeg(image: Picture) -> bytes:
     Args:
         image: (H, W, 3) uint8 BGR.
     """
-    return bytes(cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1])
+    return bytes(cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1])

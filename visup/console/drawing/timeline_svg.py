@@ -10,14 +10,14 @@ from visup.console.tracks import TimelineTrack, TrackSpan
 from visup.report.palette import SEVERITY_COLOURS, STATUS_COLOURS, css, object_colour
 
 WIDTH = 1000
-ROW = 22
-BAR = 14
-LEAST_WIDTH = 2.0
+ROW_HEIGHT = 22
+BAR_HEIGHT = 14
+MIN_BAR_WIDTH = 2.0
 """Least width of a bar, in SVG units, so that short spans are visible."""
 
 HEALTH_COLOUR = "#96769e"
 RAN_COLOUR = "#7a8b99"
-FAINT = {"hidden": 0.35, "active": 0.55, "paused": 0.45, "rested": 0.25, "blind": 0.25}
+OPACITY = {"hidden": 0.35, "active": 0.55, "paused": 0.45, "rested": 0.25, "blind": 0.25}
 """Opacity of states in which little is known or happens."""
 
 _STATUS = {s.value: css(STATUS_COLOURS[s]) for s in Status}
@@ -30,21 +30,22 @@ def timeline_svg(tracks: Sequence[TimelineTrack], seconds: float, start: float =
     Args:
         tracks: From top to bottom.
         seconds: End of the axis.
-        start: Begin of the axis, seconds: a run that follows another continues its time.
+        start: Start of the axis, seconds; not 0 for a run that continues the time of another.
 
     Returns:
-        An SVG element of `ROW` pixels per track and the full width.
+        An SVG element of `ROW_HEIGHT` pixels per track and the full width.
     """
-    height = ROW * max(1, len(tracks))
+    height = ROW_HEIGHT * max(1, len(tracks))
     axis = start, max(seconds - start, 1e-6)
     bars = "".join(_row(track, number, axis) for number, track in enumerate(tracks))
     return (
         f'<svg viewBox="0 0 {WIDTH} {height}" preserveAspectRatio="none" width="100%" '
-        f'height="{height}" role="img" aria-label="{escape(in_words(tracks), quote=True)}">{bars}</svg>'
+        f'height="{height}" role="img" '
+        f'aria-label="{escape(timeline_in_words(tracks), quote=True)}">{bars}</svg>'
     )
 
 
-def in_words(tracks: Sequence[TimelineTrack]) -> str:
+def timeline_in_words(tracks: Sequence[TimelineTrack]) -> str:
     """The timeline as a text for screen readers."""
     text = [f"{t.label}: {_spans_in_words(t.spans)}" for t in tracks if t.group != "object"]
     return "; ".join(text) or "No events."
@@ -55,19 +56,22 @@ def _spans_in_words(spans: Sequence[TrackSpan]) -> str:
 
 
 def _row(track: TimelineTrack, number: int, axis: tuple[float, float]) -> str:
-    top = number * ROW
-    ground = f'<rect class="row" x="0" y="{top + 1}" width="{WIDTH}" height="{ROW - 2}"/>'
-    return ground + "".join(_bar(track, span, top, axis) for span in track.spans)
+    top = number * ROW_HEIGHT
+    background = (
+        f'<rect class="row" x="0" y="{top + 1}" width="{WIDTH}" height="{ROW_HEIGHT - 2}"/>'
+    )
+    return background + "".join(_bar(track, span, top, axis) for span in track.spans)
 
 
 def _bar(track: TimelineTrack, span: TrackSpan, top: int, axis: tuple[float, float]) -> str:
     start, length = axis
     left = WIDTH * min(1.0, max(0.0, (span.start - start) / length))
-    wide = max(LEAST_WIDTH, WIDTH * min(1.0, (span.end - start) / length) - left)
+    width = max(MIN_BAR_WIDTH, WIDTH * min(1.0, (span.end - start) / length) - left)
     text = f"{track.label}: {span.state}, {span.start:.1f} to {span.end:.1f} s. {span.text}"
     return (
-        f'<rect x="{left:.2f}" y="{top + (ROW - BAR) // 2}" width="{wide:.2f}" height="{BAR}" '
-        f'fill="{colour_of(track, span)}" opacity="{FAINT.get(span.state, 1.0)}">'
+        f'<rect x="{left:.2f}" y="{top + (ROW_HEIGHT - BAR_HEIGHT) // 2}" width="{width:.2f}" '
+        f'height="{BAR_HEIGHT}" '
+        f'fill="{colour_of(track, span)}" opacity="{OPACITY.get(span.state, 1.0)}">'
         f"<title>{escape(text)}</title></rect>"
     )
 

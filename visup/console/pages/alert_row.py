@@ -12,8 +12,8 @@ from visup.agent import Alert
 from visup.agent.model.errors import VisupError
 from visup.console.access import ConsoleRole
 from visup.console.evidence import evidence_of
-from visup.console.feedback import AlertFeedback, Opinion, say
-from visup.console.pages.frame import shown_text, worded_button
+from visup.console.feedback import AlertFeedback, Opinion, store_feedback
+from visup.console.pages.page_elements import safe_text, text_button
 from visup.console.run_view import RunView
 from visup.wording import prose
 
@@ -26,51 +26,51 @@ class AlertRow:
         key: Key of its run.
         run: Its run.
         alert: The alert.
-        said: The latest feedback, or None.
+        feedback: The latest feedback, or None.
         camera: Name of its camera; empty if that is clear.
     """
 
     key: str
     run: RunView
     alert: Alert
-    said: AlertFeedback | None
+    feedback: AlertFeedback | None
     camera: str = ""
 
 
 def show_alert(
-    row: AlertRow, role: ConsoleRole, go: Callable[[], object], again: Callable[[], object]
+    row: AlertRow, role: ConsoleRole, on_open: Callable[[], object], refresh: Callable[[], object]
 ) -> None:
     """Lay out a row.
 
     Args:
         row: The alert.
         role: Role of the user; only operators may give feedback.
-        go: Moves the cursor to the alert.
-        again: Redraws all rows.
+        on_open: Moves the cursor to the alert.
+        refresh: Redraws all rows.
     """
     with ui.element("div").classes("alert"):
         _thumbnail(row)
         with ui.element("div").classes("alert-words"):
             with ui.element("div").classes(f"line {row.alert.severity.name.lower()}"):
-                ui.label(row.run.when(row.alert.opened)).classes("when")
+                ui.label(row.run.time_text(row.alert.opened)).classes("when")
                 with ui.element("button").classes("plain said") as button:
-                    ui.label(shown_text(prose(row.alert.cause)))
-                button.on("click", go)
-            _below(row, role, again)
+                    ui.label(safe_text(prose(row.alert.cause)))
+                button.on("click", on_open)
+            _details(row, role, refresh)
 
 
-def _below(row: AlertRow, role: ConsoleRole, again: Callable[[], object]) -> None:
+def _details(row: AlertRow, role: ConsoleRole, refresh: Callable[[], object]) -> None:
     """Objects, duration, feedback so far, and buttons for feedback."""
     alert = row.alert
-    until = "still open" if alert.closed is None else f"until {row.run.when(alert.closed)}"
+    until = "still open" if alert.closed is None else f"until {row.run.time_text(alert.closed)}"
     facts = [row.camera, alert.kind.replace("_", " "), until]
     with ui.row().classes("items-center gap-2 under-line"):
-        ui.label(shown_text(", ".join(filter(None, facts)))).classes("dim")
-        if row.said:
-            note = f": {row.said.note}" if row.said.note else ""
-            ui.label(shown_text(f"{row.said.opinion.value}{note}")).classes("dim opinion")
+        ui.label(safe_text(", ".join(filter(None, facts)))).classes("dim")
+        if row.feedback:
+            note = f": {row.feedback.note}" if row.feedback.note else ""
+            ui.label(safe_text(f"{row.feedback.opinion.value}{note}")).classes("dim opinion")
         if role is ConsoleRole.OPERATOR:
-            _opinions(row, again)
+            _feedback_buttons(row, refresh)
 
 
 def _thumbnail(row: AlertRow) -> None:
@@ -87,42 +87,42 @@ def _thumbnail(row: AlertRow) -> None:
 
 def _show_evidence(row: AlertRow) -> None:
     evidence = evidence_of(row.run.folder, row.alert.id)
-    place = f"/evidence/{row.key}/{row.alert.id}"
+    url = f"/evidence/{row.key}/{row.alert.id}"
     with ui.dialog() as dialog, ui.card().classes("card evidence-large"):
-        ui.label(shown_text(f"{row.run.when(row.alert.opened)}  {prose(row.alert.cause)}"))
+        ui.label(safe_text(f"{row.run.time_text(row.alert.opened)}  {prose(row.alert.cause)}"))
         if evidence.clip:
             video = ui.element("video").props(
                 "controls autoplay muted playsinline preload=metadata"
             )
-            video.props["src"], video.props["poster"] = f"{place}.webm", f"{place}.jpg"
+            video.props["src"], video.props["poster"] = f"{url}.webm", f"{url}.jpg"
             video.props["aria-label"] = "Clip of the alert"
         if evidence.snapshot:
             picture = ui.element("img")
-            picture.props["src"] = f"{place}.jpg"
+            picture.props["src"] = f"{url}.jpg"
             picture.props["alt"] = "The picture when the alert was opened"
-        if evidence.awaited:
+        if evidence.clip_pending:
             ui.label("The clip is still being made.").classes("dim")
-        worded_button("Close", dialog.close, main=True)
+        text_button("Close", dialog.close, primary=True)
     dialog.open()
 
 
-def _opinions(row: AlertRow, again: Callable[[], object]) -> None:
+def _feedback_buttons(row: AlertRow, refresh: Callable[[], object]) -> None:
     """The feedback buttons of an operator."""
 
-    def keep(opinion: Opinion, note: str = "") -> None:
+    def store(opinion: Opinion, note: str = "") -> None:
         try:
-            say(row.run.folder, row.alert, opinion, note)
+            store_feedback(row.run.folder, row.alert, opinion, note)
         except VisupError as fault:
-            ui.notify(shown_text(str(fault)), type="negative", multi_line=True)
+            ui.notify(safe_text(str(fault)), type="negative", multi_line=True)
             return
-        again()
+        refresh()
 
     for opinion in (Opinion.SEEN, Opinion.RIGHT, Opinion.FALSE_ALARM):
-        worded_button(opinion.value, partial(keep, opinion))
-    worded_button("mute…", lambda: _mute(keep)).tooltip("needs a reason")
+        text_button(opinion.value, partial(store, opinion))
+    text_button("mute…", lambda: _mute(store)).tooltip("needs a reason")
 
 
-def _mute(keep: Callable[[Opinion, str], None]) -> None:
+def _mute(store: Callable[[Opinion, str], None]) -> None:
     """Ask for the reason."""
     with ui.dialog() as dialog, ui.card():
         ui.label("Why is it muted?")
@@ -130,7 +130,7 @@ def _mute(keep: Callable[[Opinion, str], None]) -> None:
 
         def done() -> None:
             dialog.close()
-            keep(Opinion.MUTED, str(reason.value or ""))
+            store(Opinion.MUTED, str(reason.value or ""))
 
-        worded_button("Mute", done, main=True)
+        text_button("Mute", done, primary=True)
     dialog.open()

@@ -7,22 +7,22 @@ from collections.abc import Sequence
 
 from nicegui import ui
 
-from visup.console.pages.frame import shown_text
-from visup.console.workbench.drafts import DraftFault, begun_word
+from visup.console.pages.page_elements import safe_text
+from visup.console.workbench.drafts import DraftFault, completion_prefix
 from visup.tasks.tools.editing import Completion
 
-WAIT_S = 2.0
+CARET_TIMEOUT_S = 2.0
 """Timeout for the browser to report the caret, seconds."""
 
-_NAMED = (
+_SET_ACCESSIBLE_NAME = (
     "(async () => {{ for (let k = 0; k < 50; k++) {{ const c = getElement({id});"
     " if (c?.editor) {{ c.editor.contentDOM.setAttribute('aria-label', 'Text'); return; }}"
     " await new Promise(r => setTimeout(r, 100)); }} }})()"
 )
-_PUT = (
+_INSERT = (
     "const e = getElement({id}).editor, h = e.state.selection.main.head, w = {word};"
-    " e.dispatch({{changes: {{from: h - {begun}, to: h, insert: w}},"
-    " selection: {{anchor: h - {begun} + w.length}}}}); e.focus();"
+    " e.dispatch({{changes: {{from: h - {prefix}, to: h, insert: w}},"
+    " selection: {{anchor: h - {prefix} + w.length}}}}); e.focus();"
 )
 
 
@@ -32,7 +32,7 @@ class DraftEditor:
     def __init__(self, text: str = "") -> None:
         self.changed = True
         self._field = ui.codemirror(text, language=None, line_wrapping=True)
-        self._field.classes("w-full editor").on_value_change(self._note)
+        self._field.classes("w-full editor").on_value_change(self._mark_changed)
 
     @property
     def text(self) -> str:
@@ -43,14 +43,14 @@ class DraftEditor:
     def text(self, text: str) -> None:
         self._field.set_value(text)
 
-    def _note(self) -> None:
+    def _mark_changed(self) -> None:
         self.changed = True
 
-    def name(self) -> None:
+    def set_accessible_name(self) -> None:
         """Set its accessible name each time it is shown."""
-        ui.run_javascript(_NAMED.format(id=self._field.id))
+        ui.run_javascript(_SET_ACCESSIBLE_NAME.format(id=self._field.id))
 
-    def mark(self, faults: Sequence[DraftFault]) -> None:
+    def mark_mistakes(self, faults: Sequence[DraftFault]) -> None:
         """Mark the lines of mistakes, with tooltips."""
         last = self.text.count("\n") + 1
         lines: dict[int, str] = {}
@@ -61,18 +61,18 @@ class DraftEditor:
         self._field.decorations = [
             {"kind": "line", "line": n, "class": "fault-line"} for n in sorted(lines)
         ]
-        self._field.line_tooltips = {n: shown_text(text) for n, text in lines.items()}
+        self._field.line_tooltips = {n: safe_text(text) for n, text in lines.items()}
 
     def show_line(self, line: int) -> None:
         """Bring a line into view."""
         if line:
             self._field.reveal_line(line)
 
-    async def place(self) -> int:
+    async def caret_offset(self) -> int:
         """Offset of the caret in characters; the end if the browser does not report it."""
         code = f"getElement({self._field.id})?.editor?.state.selection.main.head"
         try:
-            caret = await ui.run_javascript(code, timeout=WAIT_S)
+            caret = await ui.run_javascript(code, timeout=CARET_TIMEOUT_S)
         except TimeoutError:
             caret = None
         units = self.text.encode("utf-16-le")  # browsers count UTF-16 units
@@ -82,12 +82,12 @@ class DraftEditor:
             else self.text
         )
 
-    async def put(self, word: Completion) -> None:
+    async def insert(self, word: Completion) -> None:
         """Insert a word at the caret in place of its typed beginning."""
-        before = self.text[: await self.place()]
-        begun = begun_word(before)
+        before = self.text[: await self.caret_offset()]
+        prefix = completion_prefix(before)
         text = word.text
-        if text.startswith("<") and before[: len(before) - len(begun)].endswith("<"):
+        if text.startswith("<") and before[: len(before) - len(prefix)].endswith("<"):
             text = text[1:]
-        code = _PUT.format(id=self._field.id, word=json.dumps(text), begun=len(begun))
+        code = _INSERT.format(id=self._field.id, word=json.dumps(text), prefix=len(prefix))
         ui.run_javascript(code)

@@ -7,13 +7,13 @@ from datetime import UTC, datetime
 from nicegui import ui
 
 from visup.console.library import RunEntry
-from visup.console.pages.frame import page_frame, shown_text, verdict_badge
+from visup.console.pages.page_elements import page_frame, safe_text, verdict_badge
 from visup.console.run_view import clock_text
 from visup.console.state import ConsoleState
 
-MOST_SHOWN = 200
-HEADINGS = ("", "run", "tasks", "verdict", "alerts", "length", "last written")
-WIDE = ("tasks", "length", "last written")
+MAX_ROWS = 200
+COLUMNS = ("", "run", "tasks", "verdict", "alerts", "length", "last written")
+WIDE_COLUMNS = ("tasks", "length", "last written")
 """Columns hidden in narrow windows."""
 
 
@@ -24,24 +24,24 @@ def library_page(state: ConsoleState) -> None:
     entries = state.library.scan()
 
     @ui.refreshable
-    def listed(wanted: str = "") -> None:
-        found = [e for e in entries if _matches(e, wanted)]
-        _table(found[:MOST_SHOWN])
-        if len(found) > MOST_SHOWN:
-            ui.label(f"{len(found) - MOST_SHOWN} more: narrow the search").classes("dim")
+    def run_table(query: str = "") -> None:
+        found = [e for e in entries if _matches(e, query)]
+        _table(found[:MAX_ROWS])
+        if len(found) > MAX_ROWS:
+            ui.label(f"{len(found) - MAX_ROWS} more: narrow the search").classes("dim")
         if not found:
-            ui.label("No run matches." if wanted else "There are no runs yet.").classes("dim")
+            ui.label("No run matches." if query else "There are no runs yet.").classes("dim")
 
     with ui.element("div").classes("card w-full"):
-        ui.input("Search runs", on_change=lambda e: listed.refresh(str(e.value or ""))).props(
+        ui.input("Search runs", on_change=lambda e: run_table.refresh(str(e.value or ""))).props(
             'dense outlined clearable aria-label="Search runs"'
         ).classes("w-full max-w-md")
-        listed()
+        run_table()
 
 
-def _matches(entry: RunEntry, wanted: str) -> bool:
+def _matches(entry: RunEntry, query: str) -> bool:
     """Whether an entry contains all typed words."""
-    told = (
+    fields = (
         entry.name,
         entry.source,
         entry.camera,
@@ -49,15 +49,15 @@ def _matches(entry: RunEntry, wanted: str) -> bool:
         entry.verdict or "",
         entry.problem,
     )
-    text = " ".join(told).replace("_", " ").casefold()
-    return all(word in text for word in wanted.replace("_", " ").casefold().split())
+    text = " ".join(fields).replace("_", " ").casefold()
+    return all(word in text for word in query.replace("_", " ").casefold().split())
 
 
 def _table(entries: list[RunEntry]) -> None:
     with ui.element("table").classes("runs"):
         with ui.element("thead"), ui.element("tr"):
-            for heading in HEADINGS:
-                kind = "wide" if heading in WIDE else ""
+            for heading in COLUMNS:
+                kind = "wide" if heading in WIDE_COLUMNS else ""
                 with ui.element("th").classes(kind).props("scope=col"):
                     ui.label(heading or "picture").classes("" if heading else "sr-only")
         with ui.element("tbody"):
@@ -71,11 +71,11 @@ def _row(entry: RunEntry) -> None:
             if not entry.problem:
                 ui.element("img").props(f'src="/thumbnail/{entry.key}.jpg" alt="" loading="lazy"')
         with ui.element("td"):
-            ui.link(shown_text(entry.name), f"/run/{entry.key}")
-            ui.label(shown_text(entry.camera or entry.source)).classes("dim")
+            ui.link(safe_text(entry.name), f"/run/{entry.key}")
+            ui.label(safe_text(entry.camera or entry.source)).classes("dim")
         if entry.problem:
-            with ui.element("td").props(f"colspan={len(HEADINGS) - 2}"):
-                ui.label(shown_text(entry.problem)).classes("dim")
+            with ui.element("td").props(f"colspan={len(COLUMNS) - 2}"):
+                ui.label(safe_text(entry.problem)).classes("dim")
             return
         _cell(", ".join(entry.tasks) or "–", wide=True)
         with ui.element("td"):
@@ -88,4 +88,4 @@ def _row(entry: RunEntry) -> None:
 
 def _cell(text: str, *, wide: bool = False) -> None:
     with ui.element("td").classes("wide" if wide else ""):
-        ui.label(shown_text(text))
+        ui.label(safe_text(text))

@@ -10,12 +10,12 @@ from nicegui.events import GenericEventArguments
 
 from visup.agent import Mind
 from visup.agent.model.errors import VisupError
-from visup.console.drawing.overlay_svg import RelationVector, overlay_svg, vectors_of
-from visup.console.pages.frame import shown_text
+from visup.console.drawing.overlay_svg import RelationLine, overlay_svg, relation_lines
+from visup.console.pages.page_elements import safe_text
 from visup.console.pages.playhead import Playhead
 from visup.console.state import ConsoleState
 
-POINTED = (
+CLICK_HANDLER = (
     "(e) => { const s = e.currentTarget.querySelector('svg'); if (!s) return;"
     " const p = new DOMPoint(e.clientX, e.clientY).matrixTransform(s.getScreenCTM().inverse());"
     " emit([p.x, p.y]); }"
@@ -23,7 +23,7 @@ POINTED = (
 
 
 @dataclass(slots=True)
-class ShownLayers:
+class VisibleLayers:
     """The visible layers.
 
     Attributes:
@@ -50,14 +50,14 @@ class RunPicture:
 
     def __init__(self, state: ConsoleState, head: Playhead, key: str) -> None:
         self._state, self._head, self._key = state, head, key
-        self._layers = ShownLayers()
-        self._vectors: tuple[int, Sequence[RelationVector]] = (-1, ())
+        self._layers = VisibleLayers()
+        self._relation_lines: tuple[int, Sequence[RelationLine]] = (-1, ())
         self._busy = False
-        with ui.element("div").classes("stage-picture") as place:
+        with ui.element("div").classes("stage-picture") as container:
             self._image = ui.element("img").classes("picture")
             self._image.props["alt"] = "The frame with what is believed drawn over it"
-            self._over = ui.html("", sanitize=False).classes("over")
-        place.on("click", self._pointed, js_handler=POINTED)
+            self._overlay = ui.html("", sanitize=False).classes("over")
+        container.on("click", self._clicked, js_handler=CLICK_HANDLER)
         self._switches()
         head.listen(self._show)
         self._show()
@@ -65,39 +65,43 @@ class RunPicture:
     def _switches(self) -> None:
         has_zones = bool(self._head.run.zones)
         with ui.row().classes("gap-3 items-center layers"):
-            self._switch("contours", "plain", turned=True)
+            self._switch("contours", "plain", inverted=True)
             self._switch("relations", "relations")
             self._switch("trails", "trails")
             if has_zones:
                 self._switch("zones", "zones")
-            self._said = ui.label().classes("dim")
+            self._status = ui.label().classes("dim")
         if self._head.run.pictures.problem:
-            ui.label(shown_text(self._head.run.pictures.problem)).classes("dim")
+            ui.label(safe_text(self._head.run.pictures.problem)).classes("dim")
 
-    def _switch(self, words: str, layer: str, *, turned: bool = False) -> None:
+    def _switch(self, label: str, layer: str, *, inverted: bool = False) -> None:
         def changed(on: bool) -> None:
-            setattr(self._layers, layer, on != turned)
+            setattr(self._layers, layer, on != inverted)
             self._show()
 
-        value = getattr(self._layers, layer) != turned
-        box = ui.checkbox(words, value=value, on_change=lambda e: changed(bool(e.value)))
+        value = getattr(self._layers, layer) != inverted
+        box = ui.checkbox(label, value=value, on_change=lambda e: changed(bool(e.value)))
         box.props("dense size=xs")
 
-    def _pointed(self, e: GenericEventArguments) -> None:
+    def _clicked(self, e: GenericEventArguments) -> None:
         x, y = (float(v) for v in e.args)
-        self._head.point(x, y)
+        self._head.click(x, y)
 
     def _show(self) -> None:
         plain = "?plain=1" if self._layers.plain else ""
         self._image.props["src"] = f"/picture/{self._key}/{self._head.number}.jpg{plain}"
         self._image.update()
         self._draw()
-        if self._layers.relations and self._vectors[0] != self._head.number and not self._busy:
-            background_tasks.create(self._relate())
+        if (
+            self._layers.relations
+            and self._relation_lines[0] != self._head.number
+            and not self._busy
+        ):
+            background_tasks.create(self._load_relations())
 
     def _draw(self) -> None:
         head, layers = self._head, self._layers
-        number, vectors = self._vectors
+        number, lines = self._relation_lines
         try:
             mind = head.run.mind(head.number)
             trails: Mapping[int, Sequence[tuple[float, float]]] = (
@@ -107,21 +111,25 @@ class RunPicture:
             return
         if not layers.zones:
             mind = replace(mind, zones=())
-        shown = vectors if layers.relations and number == head.number else ()
-        self._over.set_content(overlay_svg(mind, shown, trails, head.drawn, head.chosen))
+        shown = lines if layers.relations and number == head.number else ()
+        self._overlay.set_content(
+            overlay_svg(mind, shown, trails, head.zone_corners, head.selected)
+        )
 
-    async def _relate(self) -> None:
+    async def _load_relations(self) -> None:
         """Fetch the relations of the moment: they come from replayed reasoning, in the background."""
         self._busy = True
-        self._said.set_text("" if self._vectors[0] >= 0 else "reasoning up to here ...")
+        self._status.set_text("" if self._relation_lines[0] >= 0 else "reasoning up to here ...")
         try:
-            while self._layers.relations and self._vectors[0] != (number := self._head.number):
+            while self._layers.relations and self._relation_lines[0] != (
+                number := self._head.number
+            ):
                 mind = await run.io_bound(self._mind, number)
-                self._vectors = number, vectors_of(mind) if mind else ()
-            self._said.set_text("")
+                self._relation_lines = number, relation_lines(mind) if mind else ()
+            self._status.set_text("")
             self._draw()
         except VisupError as fault:
-            self._said.set_text(shown_text(fault.what))
+            self._status.set_text(safe_text(fault.what))
         finally:
             self._busy = False
 

@@ -29,9 +29,9 @@ class Playhead:
         speed: Playback speed, 1 for real time.
         time: Position, seconds; during playback between two moments.
         panel: Name of the open panel.
-        chosen: The object that was clicked, or None.
-        drawn: Corners of a zone that is being drawn, pixels.
-        pen: Whether clicks on the picture draw.
+        selected: The object that was clicked, or None.
+        zone_corners: Corners of a zone that is being drawn, pixels.
+        drawing_zone: Whether clicks on the picture draw.
     """
 
     run: RunView
@@ -40,9 +40,9 @@ class Playhead:
     speed: float = 1.0
     time: float = 0.0
     panel: str = ""
-    chosen: int | None = None
-    drawn: list[tuple[float, float]] = field(default_factory=list)
-    pen: bool = False
+    selected: int | None = None
+    zone_corners: list[tuple[float, float]] = field(default_factory=list)
+    drawing_zone: bool = False
     _listeners: list[tuple[Listener, str | None]] = field(default_factory=list)
     _growth_listeners: list[Listener] = field(default_factory=list)
 
@@ -70,29 +70,29 @@ class Playhead:
         self.panel = name
         self._notify()
 
-    def point(self, x: float, y: float) -> None:
+    def click(self, x: float, y: float) -> None:
         """Handle a click on the picture, pixels: draw a corner, or choose the smallest object there."""
-        if self.pen:
-            self.drawn.append((round(x, 1), round(y, 1)))
+        if self.drawing_zone:
+            self.zone_corners.append((round(x, 1), round(y, 1)))
             self._notify()
             return
-        here = [
+        hit = [
             b
             for b in self.run.mind(self.number).present()
             if 0 <= x - b.region.bbox[0] <= b.region.bbox[2]
             and 0 <= y - b.region.bbox[1] <= b.region.bbox[3]
         ]
-        smallest = min(here, key=lambda b: b.region.bbox[2] * b.region.bbox[3], default=None)
-        self.choose(None if smallest is None else smallest.id)
+        smallest = min(hit, key=lambda b: b.region.bbox[2] * b.region.bbox[3], default=None)
+        self.select(None if smallest is None else smallest.id)
 
-    def draw(self, corners: list[tuple[float, float]] | None = None) -> None:
+    def set_zone_corners(self, corners: list[tuple[float, float]] | None = None) -> None:
         """Replace the corners of the zone being drawn; none by default."""
-        self.drawn = corners or []
+        self.zone_corners = corners or []
         self._notify()
 
-    def choose(self, object_id: int | None) -> None:
+    def select(self, object_id: int | None) -> None:
         """Choose an object, or clear the choice if it was chosen already."""
-        self.chosen = None if self.chosen == object_id else object_id
+        self.selected = None if self.selected == object_id else object_id
         self._notify()
 
     def go(self, number: int) -> None:
@@ -105,13 +105,13 @@ class Playhead:
 
     def go_to_time(self, seconds: float) -> None:
         """Move to the last moment not after a time."""
-        self.go(self.run.at(seconds))
+        self.go(self.run.moment_at(seconds))
 
     def go_to_share(self, share: float) -> None:
         """Move to a share of the run, 0 to 1."""
         self.go_to_time(self.run.start + share * (self.run.seconds - self.run.start))
 
-    def pull(self, share: float) -> None:
+    def drag_to_share(self, share: float) -> None:
         """Follow a slider: as `go_to_share`, but by at least one moment, since the slider is coarser."""
         before, number = self.run.share(self.time), self.number
         self.go_to_share(share)
@@ -127,7 +127,7 @@ class Playhead:
         if not self.playing:
             return
         self.time += seconds * self.speed
-        number = self.run.at(self.time)
+        number = self.run.moment_at(self.time)
         if number != self.number:
             self.number = number
             self._notify()
@@ -142,16 +142,16 @@ class Playhead:
         self.playing = not self.playing
         self._notify()
 
-    def next_event(self, forth: bool = True) -> None:
+    def next_event(self, forward: bool = True) -> None:
         """Jump to the next or the previous moment with an event."""
         times = sorted({e.time for e in self.run.events})
         here = self.run.times[self.number] if self.run.times else 0.0
-        if forth:
-            at = bisect_right(times, here + 1e-6)
-            found = times[at] if at < len(times) else None
+        if forward:
+            index = bisect_right(times, here + 1e-6)
+            found = times[index] if index < len(times) else None
         else:
-            at = bisect_left(times, here - 1e-6)
-            found = times[at - 1] if at else None
+            index = bisect_left(times, here - 1e-6)
+            found = times[index - 1] if index else None
         if found is not None:
             self.go_to_time(found)
 

@@ -9,16 +9,16 @@ from nicegui import events, ui
 from visup.agent.model.errors import OutputError, VisupError
 from visup.console.access import ConsoleRole
 from visup.console.drawing.timeline_svg import timeline_svg
-from visup.console.pages.frame import button, page_frame, shown_text, verdict_badge
-from visup.console.pages.keys import show_keys
+from visup.console.pages.page_elements import icon_button, page_frame, safe_text, verdict_badge
 from visup.console.pages.panels.ask_panel import ask_panel
 from visup.console.pages.panels.belief_panel import belief_panel
 from visup.console.pages.panels.events_panel import alerts_panel, events_panel
 from visup.console.pages.panels.steps_panel import steps_panel
-from visup.console.pages.panels.try_panel import try_panel
+from visup.console.pages.panels.what_if_panel import what_if_panel
 from visup.console.pages.panels.write_panel import write_panel
 from visup.console.pages.picture import RunPicture
 from visup.console.pages.playhead import SLIDER_STEP, SPEEDS, TICK_S, Playhead
+from visup.console.pages.shortcuts import show_shortcuts
 from visup.console.state import ConsoleState
 from visup.console.tracks import TimelineTrack
 
@@ -26,14 +26,14 @@ REFRESH_S = 2.0
 """Interval of checks whether a live run has grown, seconds."""
 
 
-def run_page(state: ConsoleState, key: str, role: ConsoleRole, begin: float) -> None:
+def run_page(state: ConsoleState, key: str, role: ConsoleRole, start_s: float) -> None:
     """Lay out the page.
 
     Args:
         state: Shared state of all pages.
         key: Key of the run.
         role: Role of the user.
-        begin: Initial position, seconds.
+        start_s: Initial position, seconds.
     """
     try:
         run = state.view(key, refresh=True)
@@ -41,13 +41,13 @@ def run_page(state: ConsoleState, key: str, role: ConsoleRole, begin: float) -> 
         with page_frame("Run"):
             pass
         with ui.element("div").classes("card w-full"):
-            ui.label(shown_text(fault.what if isinstance(fault, OutputError) else str(fault)))
+            ui.label(safe_text(fault.what if isinstance(fault, OutputError) else str(fault)))
             ui.link("All runs", "/").classes("brand")
         return
     head = Playhead(run)
     with page_frame(run.name):
         _verdict(head)
-        button("keyboard", "Keys (?)", show_keys)
+        icon_button("keyboard", "Keys (?)", show_shortcuts)
     if not run.frames:
         ui.label("Nothing has been processed in this run yet.").classes("card w-full")
         return
@@ -58,9 +58,9 @@ def run_page(state: ConsoleState, key: str, role: ConsoleRole, begin: float) -> 
             _timeline(head)
         with ui.element("section").classes("card").props('aria-label="What is believed"'):
             _tabs(state, head, key, role)
-    _keys(head)
+    _shortcuts(head)
     ui.timer(TICK_S, head.tick)
-    head.go_to_time(begin)
+    head.go_to_time(start_s)
     if not run.ended:
         _follow(state, key, head)
 
@@ -78,13 +78,13 @@ def _verdict(head: Playhead) -> None:
 
 def _controls(head: Playhead) -> None:
     with ui.element("div").classes("controls").props('role=group aria-label="Playing"'):
-        button("first_page", "To the start", lambda: head.go(0))
-        button("skip_previous", "Previous event (p)", lambda: head.next_event(forth=False))
-        button("chevron_left", "One frame back (←)", lambda: head.step(-1))
-        play = button("play_arrow", "Play or pause (space)", head.toggle)
-        button("chevron_right", "One frame forward (→)", lambda: head.step(1))
-        button("skip_next", "Next event (n)", head.next_event)
-        button("last_page", "To the end", lambda: head.go(len(head.run.frames) - 1))
+        icon_button("first_page", "To the start", lambda: head.go(0))
+        icon_button("skip_previous", "Previous event (p)", lambda: head.next_event(forward=False))
+        icon_button("chevron_left", "One frame back (←)", lambda: head.step(-1))
+        play = icon_button("play_arrow", "Play or pause (space)", head.toggle)
+        icon_button("chevron_right", "One frame forward (→)", lambda: head.step(1))
+        icon_button("skip_next", "Next event (n)", head.next_event)
+        icon_button("last_page", "To the end", lambda: head.go(len(head.run.frames) - 1))
         speeds = {s: f"{s:g}×" for s in SPEEDS}
         ui.select(speeds, value=1.0, on_change=lambda e: setattr(head, "speed", e.value)).props(
             'dense borderless options-dense aria-label="Speed"'
@@ -95,7 +95,7 @@ def _controls(head: Playhead) -> None:
     def show() -> None:
         play.props(f"icon={'pause' if head.playing else 'play_arrow'}")
         run = head.run
-        where.set_text(run.now(run.times[head.number]))
+        where.set_text(run.cursor_text(run.times[head.number]))
         frame.set_text(f"frame {run.frames[head.number]}")
 
     head.listen(show)
@@ -108,7 +108,7 @@ def _timeline(head: Playhead) -> None:
         ui.element("div")
         slider = ui.slider(min=0, max=1.0, step=SLIDER_STEP, value=0.0)
         slider.props('dense aria-label="Moment"').on(
-            "update:model-value", lambda e: head.pull(float(e.args)), throttle=0.05
+            "update:model-value", lambda e: head.drag_to_share(float(e.args)), throttle=0.05
         )
         with ui.element("div").classes("labels").props("aria-hidden=true"):
             _track_labels(head)
@@ -144,7 +144,7 @@ def _track_labels(head: Playhead) -> None:
     @ui.refreshable
     def labels() -> None:
         for track in shown:
-            ui.label(shown_text(track.label)).props(f'title="{track.group}"')
+            ui.label(safe_text(track.label)).props(f'title="{track.group}"')
 
     def grown() -> None:
         now = list(head.run.tracks)
@@ -161,44 +161,44 @@ def _tabs(state: ConsoleState, head: Playhead, key: str, role: ConsoleRole) -> N
     names = ("Now", "Events", "Alerts", "Ask", "Steps", "What if", "Write")
     head.panel = names[0]
     with ui.tabs().props("dense align=left no-caps") as tabs:
-        made = {name: ui.tab(name) for name in names}
-    with ui.tab_panels(tabs, value=made["Now"], animated=False).classes("w-full"):
-        with ui.tab_panel(made["Now"]):
+        elements = {name: ui.tab(name) for name in names}
+    with ui.tab_panels(tabs, value=elements["Now"], animated=False).classes("w-full"):
+        with ui.tab_panel(elements["Now"]):
             belief_panel(state, head, key, role)
-        with ui.tab_panel(made["Events"]):
+        with ui.tab_panel(elements["Events"]):
             events_panel(head)
-        with ui.tab_panel(made["Alerts"]):
+        with ui.tab_panel(elements["Alerts"]):
             alerts_panel(head, key, role)
-        with ui.tab_panel(made["Ask"]):
+        with ui.tab_panel(elements["Ask"]):
             ask_panel(state, head, key)
-        with ui.tab_panel(made["Steps"]):
+        with ui.tab_panel(elements["Steps"]):
             steps_panel(state, head, key)
-        with ui.tab_panel(made["What if"]):
-            try_panel(state, head, key, role)
-        with ui.tab_panel(made["Write"]):
+        with ui.tab_panel(elements["What if"]):
+            what_if_panel(state, head, key, role)
+        with ui.tab_panel(elements["Write"]):
             write_panel(state, head, key, role)
     tabs.on_value_change(lambda e: head.open_panel(str(e.value)))
 
 
-def _keys(head: Playhead) -> None:
+def _shortcuts(head: Playhead) -> None:
     """Keyboard shortcuts."""
 
     def pressed(e: events.KeyEventArguments) -> None:
         if not e.action.keydown or e.modifiers.ctrl or e.modifiers.alt or e.modifiers.meta:
             return
-        by = 10 if e.modifiers.shift else 1
-        acts: dict[str, Callable[[], object]] = {
+        step = 10 if e.modifiers.shift else 1
+        actions: dict[str, Callable[[], object]] = {
             " ": head.toggle,
-            "ArrowLeft": lambda: head.step(-by),
-            "ArrowRight": lambda: head.step(by),
+            "ArrowLeft": lambda: head.step(-step),
+            "ArrowRight": lambda: head.step(step),
             "Home": lambda: head.go(0),
             "End": lambda: head.go(len(head.run.frames) - 1),
             "n": head.next_event,
-            "p": lambda: head.next_event(forth=False),
-            "?": show_keys,
+            "p": lambda: head.next_event(forward=False),
+            "?": show_shortcuts,
         }
-        if act := acts.get(str(e.key)):
-            act()
+        if action := actions.get(str(e.key)):
+            action()
 
     ui.keyboard(on_key=pressed, ignore=["input", "select", "button", "textarea"])
 
@@ -206,7 +206,7 @@ def _keys(head: Playhead) -> None:
 def _follow(state: ConsoleState, key: str, head: Playhead) -> None:
     """Refresh a live run, and stay at its end if the cursor is there."""
 
-    def look() -> None:
+    def refresh() -> None:
         try:
             grown = state.view(key, refresh=True)
         except VisupError:
@@ -216,4 +216,4 @@ def _follow(state: ConsoleState, key: str, head: Playhead) -> None:
         if grown.ended:
             timer.cancel()
 
-    timer = ui.timer(REFRESH_S, look)
+    timer = ui.timer(REFRESH_S, refresh)

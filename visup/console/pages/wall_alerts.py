@@ -29,18 +29,18 @@ class AlertFilter:
     words: str = ""
     critical: bool = False
 
-    def wants(self, row: AlertRow) -> bool:
+    def matches(self, row: AlertRow) -> bool:
         """Whether a row is shown."""
         alert = row.alert
         text = f"{row.camera} {alert.kind} {alert.cause}".replace("_", " ").casefold()
         words = self.words.replace("_", " ").casefold().split()
-        least = Severity.CRITICAL if self.critical else Severity.WARNING
-        state = {"open": alert.closed is None, "unseen": row.said is None}.get(self.state, True)
-        return state and alert.severity >= least and all(word in text for word in words)
+        min_severity = Severity.CRITICAL if self.critical else Severity.WARNING
+        state = {"open": alert.closed is None, "unseen": row.feedback is None}.get(self.state, True)
+        return state and alert.severity >= min_severity and all(word in text for word in words)
 
 
 def alert_rows(
-    state: ConsoleState, entries: Iterable[RunEntry], wanted: AlertFilter
+    state: ConsoleState, entries: Iterable[RunEntry], alert_filter: AlertFilter
 ) -> list[AlertRow]:
     """The alerts of some runs that pass the filter, by severity and then latest first."""
     found: list[AlertRow] = []
@@ -54,11 +54,11 @@ def alert_rows(
             ]
         except (VisupError, OSError):
             continue
-    rows = [row for row in found if wanted.wants(row)]
-    return sorted(rows, key=lambda r: (-r.alert.severity, -_opened(r), r.key))
+    rows = [row for row in found if alert_filter.matches(row)]
+    return sorted(rows, key=lambda r: (-r.alert.severity, -_opening_time(r), r.key))
 
 
-def _opened(row: AlertRow) -> float:
+def _opening_time(row: AlertRow) -> float:
     """When an alert opened, in wall-clock time if known."""
     wall = row.run.clock.seconds(row.alert.opened)
     return row.alert.opened if wall is None else wall

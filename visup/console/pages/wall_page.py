@@ -13,14 +13,14 @@ from visup.console.access import ConsoleRole
 from visup.console.evidence import latest_snapshot
 from visup.console.library import RunEntry
 from visup.console.pages.alert_row import AlertRow, show_alert
-from visup.console.pages.frame import page_frame, part_heading, shown_text, verdict_badge
+from visup.console.pages.page_elements import page_frame, safe_text, section_heading, verdict_badge
 from visup.console.pages.wall_alerts import STATES, AlertFilter, alert_rows
 from visup.console.run_view import RunView
 from visup.console.state import ConsoleState
 
 REFRESH_S = 2.0
-MOST_TILES = 36
-MOST_ROWS = 60
+MAX_TILES = 36
+MAX_ROWS = 60
 
 
 def latest_by_camera(entries: Iterable[RunEntry]) -> list[RunEntry]:
@@ -41,32 +41,32 @@ def wall_page(state: ConsoleState, role: ConsoleRole) -> None:
     wall = _Wall(state, role)
     wall.tiles()
     with ui.element("section").classes("card w-full").props('aria-label="Alerts of all cameras"'):
-        part_heading("Alerts (times of cameras in UTC)")
-        _filter(wall.wanted, wall.look)
+        section_heading("Alerts (times of cameras in UTC)")
+        _filter(wall.alert_filter, wall.refresh)
         with (
             ui.element("div").classes("scroll").props('tabindex=0 role=region aria-label="Alerts"')
         ):
             wall.alerts()
-    wall.look()
-    ui.timer(REFRESH_S, wall.look)
+    wall.refresh()
+    ui.timer(REFRESH_S, wall.refresh)
 
 
 class _Wall:
     """The content of one wall page, and what it showed last."""
 
     def __init__(self, state: ConsoleState, role: ConsoleRole) -> None:
-        self.wanted = AlertFilter()
+        self.alert_filter = AlertFilter()
         self._state, self._role = state, role
         self._shown: tuple[object, object] = (None, None)
 
-    def look(self) -> None:
+    def refresh(self) -> None:
         """Refresh."""
-        found = latest_by_camera(self._state.library.scan())[:MOST_TILES]
+        found = latest_by_camera(self._state.library.scan())[:MAX_TILES]
         runs = [(e.key, e.written, e.ended) for e in found]
         if self._shown[0] != runs:
             self.tiles.refresh(found)
-        rows = alert_rows(self._state, found, self.wanted)
-        shown_alerts = [(r.key, r.alert, r.said) for r in rows]
+        rows = alert_rows(self._state, found, self.alert_filter)
+        shown_alerts = [(r.key, r.alert, r.feedback) for r in rows]
         if self._shown[1] != shown_alerts:
             self.alerts.refresh(rows)
         self._shown = runs, shown_alerts
@@ -85,21 +85,21 @@ class _Wall:
     @ui.refreshable_method
     def alerts(self, rows: Sequence[AlertRow] = ()) -> None:
         """Draw a row for each alert."""
-        for row in rows[:MOST_ROWS]:
+        for row in rows[:MAX_ROWS]:
             moment = f"/run/{row.key}?t={row.alert.opened:.2f}"
-            show_alert(row, self._role, partial(ui.navigate.to, moment), self.look)
+            show_alert(row, self._role, partial(ui.navigate.to, moment), self.refresh)
         if not rows:
             ui.label("No such alerts.").classes("dim")
 
 
-def _filter(wanted: AlertFilter, look: Callable[[], None]) -> None:
+def _filter(alert_filter: AlertFilter, refresh: Callable[[], None]) -> None:
     def changed(name: str, value: object) -> None:
-        setattr(wanted, name, value)
-        look()
+        setattr(alert_filter, name, value)
+        refresh()
 
     with ui.row().classes("items-center gap-3"):
         ui.select(
-            STATES, value=wanted.state, on_change=lambda e: changed("state", str(e.value))
+            STATES, value=alert_filter.state, on_change=lambda e: changed("state", str(e.value))
         ).props('dense outlined options-dense aria-label="Which alerts"')
         ui.input(
             placeholder="camera, kind, words",
@@ -118,10 +118,10 @@ def _tile(state: ConsoleState, entry: RunEntry) -> None:
             run = state.view(entry.key, refresh=True)
             mind = run.mind(len(run.frames) - 1)
         except VisupError as fault:
-            ui.label(shown_text(str(fault))).classes("dim")
+            ui.label(safe_text(str(fault))).classes("dim")
             return
         _latest_picture(run, entry)
-        _stand(run, mind, entry)
+        _state_summary(run, mind, entry)
 
 
 def _latest_picture(run: RunView, entry: RunEntry) -> None:
@@ -134,24 +134,24 @@ def _latest_picture(run: RunView, entry: RunEntry) -> None:
         return
     picture.props["src"] = f"/evidence/{entry.key}/{number}.jpg"
     opened = next((a.opened for a in run.alerts if a.id == number), None)
-    when = "" if opened is None else f", {run.when(opened)}"
+    when = "" if opened is None else f", {run.time_text(opened)}"
     ui.label(f"picture of alert {number}{when}").classes("dim")
 
 
-def _stand(run: RunView, mind: Mind, entry: RunEntry) -> None:
+def _state_summary(run: RunView, mind: Mind, entry: RunEntry) -> None:
     """Show verdict, stage and open alerts."""
     with ui.element("div").classes("line"):
         ui.link(
-            shown_text(entry.camera or entry.name), f"/run/{entry.key}?t={mind.time:.2f}"
+            safe_text(entry.camera or entry.name), f"/run/{entry.key}?t={mind.time:.2f}"
         ).classes("said brand")
-        ui.label(run.when(mind.time)).classes("dim")
+        ui.label(run.time_text(mind.time)).classes("dim")
         verdict_badge(run.verdict, ended=run.ended)
     for task in mind.tasks:
         status = next((s.status.value for s in task.stages if s.stage == task.current), "")
-        ui.label(shown_text(f"{task.task}: {task.current or 'over'} {status}")).classes("dim")
+        ui.label(safe_text(f"{task.task}: {task.current or 'over'} {status}")).classes("dim")
     opened = [a for a in mind.alerts if a.severity > Severity.INFO]
     if opened:
         kind = max(a.severity for a in opened).name.lower()
         with ui.element("div").classes(f"line {kind}"):
-            many = f"{len(opened)} alerts are open" if len(opened) > 1 else "1 alert is open"
-            ui.label(many).classes("said")
+            text = f"{len(opened)} alerts are open" if len(opened) > 1 else "1 alert is open"
+            ui.label(text).classes("said")

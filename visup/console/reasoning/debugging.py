@@ -14,14 +14,14 @@ from visup.stepping.breakpoints import AnyStop, PhaseStop, StopCondition
 from visup.stepping.cursor import PausedStep
 from visup.stepping.diff import MindChange, mind_diff
 
-CHUNK = 100
+CHUNK_STEPS = 100
 """Steps between two chances for other questions and for cancelling."""
 
-MOST_CONDITIONS = 20
+MAX_CONDITIONS = 20
 
 
 @dataclass(frozen=True, slots=True)
-class FoundStop:
+class StopSearchResult:
     """The result of a search.
 
     Attributes:
@@ -52,32 +52,32 @@ class PhaseRecord:
     events: tuple[str, ...] = ()
 
 
-def stop_conditions(stepper: Stepper, words: Sequence[str]) -> AnyStop:
+def stop_conditions(stepper: Stepper, texts: Sequence[str]) -> AnyStop:
     """The disjunction of several conditions in the syntax of `break` in `visup step`.
 
     Raises:
         VisupError: One of them is not valid, or there is none.
     """
-    conditions = [w.strip() for w in words if w.strip()]
-    if not 0 < len(conditions) <= MOST_CONDITIONS:
+    conditions = [w.strip() for w in texts if w.strip()]
+    if not 0 < len(conditions) <= MAX_CONDITIONS:
         raise SettingsError(
-            f"there are {len(conditions)} conditions to stop at", expected=f"1 to {MOST_CONDITIONS}"
+            f"there are {len(conditions)} conditions to stop at", expected=f"1 to {MAX_CONDITIONS}"
         )
     return AnyStop("; ".join(conditions), tuple(_condition(stepper, w) for w in conditions))
 
 
-def _condition(stepper: Stepper, words: str) -> StopCondition:
-    condition = parse_condition(words, stepper.mind, stepper.names)
+def _condition(stepper: Stepper, text: str) -> StopCondition:
+    condition = parse_condition(text, stepper.mind, stepper.names)
     if isinstance(condition, PhaseStop):
         raise SettingsError(
-            f"'{words}' is over in every step", hint="the phases of a step are listed below"
+            f"'{text}' is over in every step", hint="the phases of a step are listed below"
         )
     return condition
 
 
-def searched(
+def search_stop(
     stepper: Stepper, number: int, until: AnyStop, cancelled: Callable[[], bool]
-) -> Iterator[FoundStop]:
+) -> Iterator[StopSearchResult]:
     """Step on until a condition is met; yields the position after each chunk, finally the one found.
 
     Args:
@@ -86,13 +86,13 @@ def searched(
         until: The condition.
         cancelled: Whether the search was cancelled.
     """
-    at, found = number, False
+    position, found = number, False
     while not found and not cancelled():
-        if stepper.at != at or stepper.paused is not None:
-            stepper.go(at)
-        result = stepper.step(CHUNK, until)
-        at, found = stepper.at, bool(result.reasons) or result.ended
-        yield FoundStop(at, result.reasons, result.ended)
+        if stepper.at != position or stepper.paused is not None:
+            stepper.go(position)
+        result = stepper.step(CHUNK_STEPS, until)
+        position, found = stepper.at, bool(result.reasons) or result.ended
+        yield StopSearchResult(position, result.reasons, result.ended)
 
 
 def phases_of(stepper: Stepper, number: int) -> tuple[PhaseRecord, ...]:

@@ -16,10 +16,10 @@ from threading import Lock
 from visup.agent import Mind
 from visup.agent.model.errors import SettingsError
 from visup.console.reasoning.debugging import (
-    FoundStop,
     PhaseRecord,
+    StopSearchResult,
     phases_of,
-    searched,
+    search_stop,
     stop_conditions,
 )
 from visup.rules.language.parser import parse_rules
@@ -34,18 +34,18 @@ _INCLUDE = re.compile(r"^[^#\n]*\binclude\b", re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True)
-class AlternativeCourse:
+class BranchComparison:
     """The difference between a branch and the run.
 
     Attributes:
-        assumed: The assumption, in words.
-        differs: Events of only one of the two, and both verdicts.
-        until: End of the comparison, seconds.
+        assumption: The assumption, in words.
+        differences: Events of only one of the two, and both verdicts.
+        end: End of the comparison, seconds.
     """
 
-    assumed: str
-    differs: TranscriptDiff
-    until: float
+    assumption: str
+    differences: TranscriptDiff
+    end: float
 
 
 class Inquiry:
@@ -92,29 +92,32 @@ class Inquiry:
             return self._stepper.mind
 
     def next_stop(
-        self, number: int, words: Sequence[str], given_up: Callable[[], bool] = lambda: False
-    ) -> FoundStop:
+        self, number: int, conditions: Sequence[str], cancelled: Callable[[], bool] = lambda: False
+    ) -> StopSearchResult:
         """The next step after one at which a condition is met.
 
         Args:
             number: Number of the step, from 1.
-            words: Conditions in the syntax of `break` in `visup step`: `alert`, `rule NAME`, `stage NAME`,
+            conditions: In the syntax of `break` in `visup step`: `alert`, `rule NAME`, `stage NAME`,
                 `when gap(1, 2) < 20 px`.
-            given_up: Whether the search was cancelled.
+            cancelled: Whether the search was cancelled.
 
         Raises:
             VisupError: One of them is not valid.
         """
         with self._lock:
             self._stepper.go(number)
-            until = stop_conditions(self._stepper, words)
-        found, search = FoundStop(number), searched(self._stepper, number, until, given_up)
+            until = stop_conditions(self._stepper, conditions)
+        found, search = (
+            StopSearchResult(number),
+            search_stop(self._stepper, number, until, cancelled),
+        )
         while True:
             with self._lock:
-                place = next(search, None)
-            if place is None:
+                step = next(search, None)
+            if step is None:
                 return found
-            found = place
+            found = step
 
     def phases(self, number: int) -> tuple[PhaseRecord, ...]:
         """The effects of each phase of a step.
@@ -125,7 +128,7 @@ class Inquiry:
         with self._lock:
             return phases_of(self._stepper, number)
 
-    def what_if(self, number: int, what: str, steps: int) -> AlternativeCourse:
+    def what_if(self, number: int, what: str, steps: int) -> BranchComparison:
         """How the run would have continued after a step under an assumption.
 
         Args:
@@ -141,13 +144,13 @@ class Inquiry:
             raise SettingsError("no belief was given", expected="such as: object 2 satellite")
         with self._lock:
             self._stepper.go(number)
-            here = self._stepper
-            branch = here.branch(parse_assumption(here.mind, words, here.agent.models))
-            return _course(" ".join(words), branch, steps - number)
+            stepper = self._stepper
+            branch = stepper.branch(parse_assumption(stepper.mind, words, stepper.agent.models))
+            return _compared(" ".join(words), branch, steps - number)
 
-    def as_if_answered(
+    def what_if_answered(
         self, number: int, object_id: int, name: str, steps: int
-    ) -> AlternativeCourse:
+    ) -> BranchComparison:
         """How the run would have continued if its operator had identified an object after a step.
 
         Args:
@@ -163,11 +166,11 @@ class Inquiry:
             self._stepper.go(number)
             branch = self._stepper.branch()
             branch.answer(object_id, name)
-            return _course(
+            return _compared(
                 f"as if object {object_id} were said to be {name}", branch, steps - number
             )
 
-    def judged_by(self, kind: str, text: str, steps: int) -> AlternativeCourse:
+    def rerun_with(self, kind: str, text: str, steps: int) -> BranchComparison:
         """The whole run with another task or other rules.
 
         Args:
@@ -186,15 +189,15 @@ class Inquiry:
         with self._lock:
             self._stepper.go(0)
             reasoners = self._stepper.agent.reasoners
-            given = (
+            changed = (
                 with_rules(reasoners, parse_rules(text))
                 if kind == "rules"
                 else with_tasks(reasoners, (parse_task(text),))
             )
-            return _course(f"other {kind}", self._stepper.branch(reasoners=given), steps)
+            return _compared(f"other {kind}", self._stepper.branch(reasoners=changed), steps)
 
 
-def _course(assumed: str, branch: Stepper, steps: int) -> AlternativeCourse:
+def _compared(assumption: str, branch: Stepper, steps: int) -> BranchComparison:
     if steps > 0:
         branch.step(steps)
-    return AlternativeCourse(assumed, branch.compare(), branch.mind.time)
+    return BranchComparison(assumption, branch.compare(), branch.mind.time)

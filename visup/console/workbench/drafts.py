@@ -17,8 +17,8 @@ from visup.tasks.tools.editing import Completion, completions
 from visup.tasks.tools.outline import Branch, outline
 from visup.tasks.tools.rule_editing import rule_completions, rule_faults
 
-LONGEST_DRAFT = 100_000
-NAME = "the text"
+MAX_DRAFT_LENGTH = 100_000
+DRAFT_NAME = "the text"
 """Its name in messages."""
 
 
@@ -67,29 +67,29 @@ def check_draft(kind: DraftKind, text: str) -> DraftCheck:
     """
     if not text.strip():
         return DraftCheck()
-    if len(text) > LONGEST_DRAFT:
-        return DraftCheck((DraftFault(0, f"it is too long: at most {LONGEST_DRAFT} letters"),))
+    if len(text) > MAX_DRAFT_LENGTH:
+        return DraftCheck((DraftFault(0, f"it is too long: at most {MAX_DRAFT_LENGTH} letters"),))
     if kind is DraftKind.TASK:
         return _task(text)
     return _rules(text) if kind is DraftKind.RULES else _zones(text)
 
 
 def _task(text: str) -> DraftCheck:
-    task, faults = diagnose(text, NAME, read=_no_other)
+    task, faults = diagnose(text, DRAFT_NAME, read=_refuse_include)
     if faults:
         return DraftCheck(_located(faults))
     return DraftCheck(tree=tuple(outline(one) for one in tasks_of(task)))
 
 
-def _no_other(path: str, including: str) -> tuple[str, str]:
+def _refuse_include(path: str, including: str) -> tuple[str, str]:
     raise TaskError("what is written here cannot include another file", where=path[:80])
 
 
 def _rules(text: str) -> DraftCheck:
-    faults = rule_faults(text, NAME)
+    faults = rule_faults(text, DRAFT_NAME)
     if faults:
         return DraftCheck(_located(faults))
-    rules = parse_rules(text, NAME)
+    rules = parse_rules(text, DRAFT_NAME)
     return DraftCheck(
         tree=tuple(Branch(r.name, "stage", inside=(Branch(str(r.when), "action"),)) for r in rules)
     )
@@ -97,7 +97,7 @@ def _rules(text: str) -> DraftCheck:
 
 def _zones(text: str) -> DraftCheck:
     try:
-        zones = read_zones(text, NAME)
+        zones = read_zones(text, DRAFT_NAME)
     except ErrorGroup as group:
         return DraftCheck(tuple(DraftFault(0, str(e)) for e in group.errors))
     except VisupError as fault:
@@ -119,28 +119,28 @@ def _message(fault: Diagnostic) -> str:
     return f"{fault.message}{expected}{hint}"
 
 
-def words_at(kind: DraftKind, text: str, place: int) -> list[Completion]:
+def completions_at(kind: DraftKind, text: str, caret: int) -> list[Completion]:
     """Completions at a position.
 
     Args:
         kind: Kind of text.
         text: The text.
-        place: Offset of the caret in characters.
+        caret: Offset of the caret in characters.
     """
-    if kind is DraftKind.ZONES or len(text) > LONGEST_DRAFT:
+    if kind is DraftKind.ZONES or len(text) > MAX_DRAFT_LENGTH:
         return []
-    before = text[: max(0, place)]
+    before = text[: max(0, caret)]
     line, column = before.count("\n") + 1, len(before) - (before.rfind("\n") + 1) + 1
-    begun = begun_word(before)
+    prefix = completion_prefix(before)
     found = (
-        completions(text, NAME, line, column)
+        completions(text, DRAFT_NAME, line, column)
         if kind is DraftKind.TASK
         else list(rule_completions())
     )
-    return [c for c in found if c.text.strip("<>").startswith(begun.strip("<>"))]
+    return [c for c in found if c.text.strip("<>").startswith(prefix.strip("<>"))]
 
 
-def begun_word(before: str) -> str:
+def completion_prefix(before: str) -> str:
     """The unfinished word at the end of a text."""
     length = 0
     while length < len(before) and (before[-1 - length].isalnum() or before[-1 - length] == "_"):

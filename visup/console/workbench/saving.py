@@ -9,7 +9,7 @@ from visup.agent.model.errors import OutputError, SettingsError
 from visup.agent.storage.atomic import write_atomically
 from visup.console.workbench.drafts import DraftKind, check_draft
 
-ENDINGS = {DraftKind.TASK: ".task", DraftKind.RULES: ".rules", DraftKind.ZONES: ".toml"}
+SUFFIXES = {DraftKind.TASK: ".task", DraftKind.RULES: ".rules", DraftKind.ZONES: ".toml"}
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,62}")
 
 
@@ -39,7 +39,7 @@ def save_draft(folder: Path, kind: DraftKind, name: str, text: str, *, replace: 
         raise SettingsError(
             "only a text without mistakes is saved", hint="correct what is listed below it"
         )
-    path = folder / f"{name}{ENDINGS[kind]}"
+    path = folder / f"{name}{SUFFIXES[kind]}"
     if path.is_symlink() or (path.exists() and not (replace and path.is_file())):
         raise SettingsError(
             f"there is a file {path.name} already", hint="choose another name, or tick 'replace'"

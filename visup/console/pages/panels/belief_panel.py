@@ -10,35 +10,35 @@ from visup.agent import Mind, ObjectBelief, Presence, TaskBelief
 from visup.agent.model.errors import VisupError
 from visup.console.access import ConsoleRole
 from visup.console.drawing.flow_svg import flow_svg, percent
-from visup.console.pages.frame import (
-    OTHER_COLOUR,
+from visup.console.pages.page_elements import (
+    NEUTRAL_COLOUR,
     VERDICT_COLOURS,
     badge,
-    part_heading,
-    shown_text,
+    safe_text,
+    section_heading,
 )
 from visup.console.pages.panels.object_panel import Samples, show_object
-from visup.console.pages.panels.questions_panel import QuestionsPart
-from visup.console.pages.panels.remember_part import remember_part
+from visup.console.pages.panels.questions_panel import QuestionsSection
+from visup.console.pages.panels.teach_section import teach_section
 from visup.console.pages.playhead import Playhead
 from visup.console.state import ConsoleState
 from visup.report.palette import STATUS_COLOURS, css, object_colour
 from visup.rules.wording.sentences import role_or_model, spaced
 
-MOST_OBJECTS = 30
+MAX_OBJECTS = 30
 
 
 def belief_panel(state: ConsoleState, head: Playhead, key: str, role: ConsoleRole) -> None:
     """Lay out the panel; it follows the cursor."""
-    QuestionsPart(state, head, key, role)
-    known: dict[tuple[int, int], Samples] = {}
+    QuestionsSection(state, head, key, role)
+    cached_samples: dict[tuple[int, int], Samples] = {}
 
     @ui.refreshable
-    def now() -> None:
+    def beliefs() -> None:
         try:
             mind = head.run.mind(head.number)
         except VisupError as fault:
-            ui.label(shown_text(str(fault)))
+            ui.label(safe_text(str(fault)))
             return
         _health(mind)
         for task in mind.tasks:
@@ -47,18 +47,18 @@ def belief_panel(state: ConsoleState, head: Playhead, key: str, role: ConsoleRol
 
     @ui.refreshable
     def identity() -> None:
-        if (number := head.chosen) is not None:
-            which = number, len(head.run.frames)
-            if which not in known:
-                known.clear()
-                known[which] = list(head.run.shares(number))
-            show_object(head, key, number, known[which])
+        if (number := head.selected) is not None:
+            cache_key = number, len(head.run.frames)
+            if cache_key not in cached_samples:
+                cached_samples.clear()
+                cached_samples[cache_key] = list(head.run.identity_shares(number))
+            show_object(head, key, number, cached_samples[cache_key])
             if role is ConsoleRole.OPERATOR and state.save_to is not None:
-                remember_part(head, number, state.save_to)
+                teach_section(head, number, state.save_to)
 
-    now()
+    beliefs()
     identity()
-    head.listen(now.refresh, "Now")
+    head.listen(beliefs.refresh, "Now")
     head.listen(identity.refresh, "Now")
 
 
@@ -66,16 +66,16 @@ def _health(mind: Mind) -> None:
     if mind.health.status.value != "ok":
         with ui.element("div").classes("line critical"):
             status = mind.health.status.value.replace("_", " ")
-            ui.label(f"camera: {status}  {shown_text(mind.health.detail)}").classes("said")
+            ui.label(f"camera: {status}  {safe_text(mind.health.detail)}").classes("said")
     if mind.unknown:
         ui.label(f"not observed now: {', '.join(sorted(mind.unknown))}").classes("dim")
 
 
 def _task(task: TaskBelief, head: Playhead) -> None:
-    part_heading(f"Task {shown_text(task.task)}")
+    section_heading(f"Task {safe_text(task.task)}")
     verdict = task.verdict.value
     with ui.row().classes("gap-2 items-center"):
-        badge(verdict.replace("_", " "), VERDICT_COLOURS.get(verdict, OTHER_COLOUR))
+        badge(verdict.replace("_", " "), VERDICT_COLOURS.get(verdict, NEUTRAL_COLOUR))
         if task.success is not None and verdict == "in_progress":
             ui.label(f"probability of success: {percent(task.success)}").classes("dim")
     flow = head.run.flows.get(task.task)
@@ -88,35 +88,35 @@ def _task(task: TaskBelief, head: Playhead) -> None:
             ui.html(flow_svg(flow, task), sanitize=False)
         return
     for stage in task.stages:
-        here = stage.stage == task.current
-        with ui.element("div").classes("line now" if here else "line"):
+        is_current = stage.stage == task.current
+        with ui.element("div").classes("line now" if is_current else "line"):
             ui.element("span").classes("swatch").style(
                 f"background:{css(STATUS_COLOURS[stage.status])}"
             )
-            ui.label(shown_text(stage.stage)).classes("said")
+            ui.label(safe_text(stage.stage)).classes("said")
             ui.label(stage.status.value).classes("dim")
 
 
 def _objects(mind: Mind, head: Playhead) -> None:
-    found = sorted(mind.present(), key=lambda b: b.id)[:MOST_OBJECTS]
-    part_heading("In view" if found else "Nothing is in view")
+    found = sorted(mind.present(), key=lambda b: b.id)[:MAX_OBJECTS]
+    section_heading("In view" if found else "Nothing is in view")
     for belief in found:
-        with ui.element("div").classes("line now" if belief.id == head.chosen else "line"):
+        with ui.element("div").classes("line now" if belief.id == head.selected else "line"):
             colour = css(object_colour(belief.id))
             ui.element("span").classes("swatch").style(f"background:{colour}")
             name = ui.element("button").classes("plain said")
             name.props["aria-label"] = f"identity of object {belief.id}"
-            name.on("click", partial(head.choose, belief.id))
+            name.on("click", partial(head.select, belief.id))
             with name:
-                ui.label(_called(belief, mind))
-            ui.label(_surely(belief)).classes("dim")
+                ui.label(_label(belief, mind))
+            ui.label(_certainty(belief)).classes("dim")
 
 
-def _called(belief: ObjectBelief, mind: Mind) -> str:
+def _label(belief: ObjectBelief, mind: Mind) -> str:
     name = spaced(role_or_model(mind, belief.name)) if belief.candidates else "not identified"
-    return shown_text(f"{belief.id}  {name}")
+    return safe_text(f"{belief.id}  {name}")
 
 
-def _surely(belief: ObjectBelief) -> str:
+def _certainty(belief: ObjectBelief) -> str:
     share = percent(belief.strength) if belief.candidates else ""
     return share if belief.presence is Presence.SEEN else f"{belief.presence.value}  {share}"

@@ -10,11 +10,11 @@ from nicegui import ui
 
 from visup.agent import Hypothesis
 from visup.console.drawing.flow_svg import percent
-from visup.console.pages.frame import part_heading, shown_text, worded_button
+from visup.console.pages.page_elements import safe_text, section_heading, text_button
 from visup.console.pages.playhead import Playhead
 from visup.report.page.figures import CANDIDATE_COLOURS
 
-MOST_CURVES = 5
+MAX_CURVES = 5
 CURVE_HEIGHT = 90
 Samples = Sequence[tuple[float, Mapping[str, float]]]
 
@@ -28,45 +28,45 @@ def show_object(head: Playhead, key: str, number: int, samples: Samples) -> None
         number: Number of the object.
         samples: Shares of its names over time.
     """
-    part_heading(f"Identity of object {number}")
+    section_heading(f"Identity of object {number}")
     peaks: dict[str, float] = {}
     for _, shares in samples:
         for name, share in shares.items():
             peaks[name] = max(peaks.get(name, 0.0), share)
-    best = sorted(peaks, key=lambda n: (-peaks[n], n))[:MOST_CURVES]
-    looks = head.run.looks(head.number, number)
-    if not best and not looks:
+    best = sorted(peaks, key=lambda n: (-peaks[n], n))[:MAX_CURVES]
+    matches = head.run.matches(head.number, number)
+    if not best and not matches:
         ui.label("No model has matched it.").classes("dim")
         return
     belief = head.run.mind(head.number).objects.get(number)
     now = {c.name: c.share for c in belief.candidates} if belief else {}
-    names = [*best, *(n for n in dict.fromkeys(h.name for h in looks) if n not in best)]
-    _table(names[: len(CANDIDATE_COLOURS)], now, looks)
+    names = [*best, *(n for n in dict.fromkeys(h.name for h in matches) if n not in best)]
+    _table(names[: len(CANDIDATE_COLOURS)], now, matches)
     if best:
-        begin = head.run.start
-        since = [(time - begin, shares) for time, shares in samples]
-        place = head.run.share(head.run.times[head.number])
-        ui.html(_curves(since, best, head.run.seconds - begin, place), sanitize=False).classes(
+        start = head.run.start
+        since = [(time - start, shares) for time, shares in samples]
+        cursor = head.run.share(head.run.times[head.number])
+        ui.html(_curves(since, best, head.run.seconds - start, cursor), sanitize=False).classes(
             "w-full"
         )
-    if looks and head.run.settings and head.run.settings.models:
+    if matches and head.run.settings and head.run.settings.models:
         address = f"/likeness/{key}/{head.number}/{number}.jpg"
-        worded_button("Compare views", partial(_show_likeness, address, number))
+        text_button("Compare views", partial(_show_view_comparison, address, number))
 
 
-def _show_likeness(address: str, number: int) -> None:
+def _show_view_comparison(address: str, number: int) -> None:
     """Show the silhouette and the most similar views in a dialog."""
     description = f"Silhouette of object {number} beside the views that it looks like"
     with ui.dialog(value=True) as dialog, ui.card().classes("likeness"):
         dialog.props(f'aria-label="{description}"')
         ui.element("img").props(f'src="{address}" alt="{description}"')
-        worded_button("Close", dialog.close)
+        text_button("Close", dialog.close)
     dialog.on("hide", dialog.delete)
 
 
-def _table(names: Sequence[str], now: Mapping[str, float], looks: Sequence[Hypothesis]) -> None:
+def _table(names: Sequence[str], now: Mapping[str, float], matches: Sequence[Hypothesis]) -> None:
     """A table of names with their shares of the votes and the similarity of their best views."""
-    likest = {h.name: h for h in reversed(looks)}
+    best_matches = {h.name: h for h in reversed(matches)}
     with ui.element("table").classes("candidates"):
         with ui.element("thead"), ui.element("tr"):
             for heading in ("", "name", "votes", "similarity", "view"):
@@ -74,29 +74,29 @@ def _table(names: Sequence[str], now: Mapping[str, float], looks: Sequence[Hypot
                     ui.label(heading or "colour").classes("" if heading else "sr-only")
         with ui.element("tbody"):
             for name, colour in zip(names, CANDIDATE_COLOURS, strict=False):
-                look = likest.get(name)
+                match = best_matches.get(name)
                 cells = (
                     name,
                     percent(now.get(name, 0.0)),
-                    f"{look.similarity:.2f}" if look else "",
-                    str(look.view) if look else "",
+                    f"{match.similarity:.2f}" if match else "",
+                    str(match.view) if match else "",
                 )
                 with ui.element("tr"):
                     with ui.element("td"):
                         ui.element("span").classes("swatch block").style(f"background:{colour}")
                     for text in cells:
                         with ui.element("td"):
-                            ui.label(shown_text(text))
+                            ui.label(safe_text(text))
 
 
-def _curves(samples: Samples, names: Sequence[str], seconds: float, place: float) -> str:
+def _curves(samples: Samples, names: Sequence[str], seconds: float, cursor: float) -> str:
     """The shares of names over time with the cursor, as SVG."""
     lines = "".join(
         _curve(samples, name, colour, max(seconds, 1e-6))
         for name, colour in zip(names, CANDIDATE_COLOURS, strict=False)
     )
     description = escape(f"Share of the votes over time for {', '.join(names)}", quote=True)
-    x = f"{1000 * place:.1f}"
+    x = f"{1000 * cursor:.1f}"
     return (
         f'<svg viewBox="0 0 1000 {CURVE_HEIGHT}" preserveAspectRatio="none" width="100%" '
         f'height="{CURVE_HEIGHT}" role="img" aria-label="{description}">{lines}'

@@ -14,15 +14,15 @@ from visup.agent import Question
 from visup.agent.cycle.answers import NONE_OF_THE_MODELS
 from visup.agent.model.errors import VisupError
 from visup.console.access import ConsoleRole
-from visup.console.pages.frame import part_heading, shown_text, worded_button
-from visup.console.pages.panels.try_panel import show_tried
+from visup.console.pages.page_elements import safe_text, section_heading, text_button
+from visup.console.pages.panels.what_if_panel import show_comparison
 from visup.console.pages.playhead import Playhead
-from visup.console.questions import questions_at
+from visup.console.questions import open_questions
 from visup.console.state import ConsoleState
 from visup.runs.inputs.answer_box import put_answer
 
 
-class QuestionsPart:
+class QuestionsSection:
     """The questions open at the cursor.
 
     Args:
@@ -35,52 +35,54 @@ class QuestionsPart:
     def __init__(self, state: ConsoleState, head: Playhead, key: str, role: ConsoleRole) -> None:
         self._state, self._head, self._key = state, head, key
         self._operator = role is ConsoleRole.OPERATOR
-        self._waiting()
+        self._open_questions()
         self._answer = ui.column().classes("w-full gap-0")
-        head.listen(self._moved, "Now")
+        head.listen(self._update, "Now")
 
-    def _moved(self) -> None:
+    def _update(self) -> None:
         self._answer.clear()
-        self._waiting.refresh()
+        self._open_questions.refresh()
 
     @ui.refreshable_method
-    def _waiting(self) -> None:
-        waiting = questions_at(self._head.run.events, self._head.run.times[self._head.number])
-        if waiting:
-            part_heading("Asked")
-        for question in waiting:
+    def _open_questions(self) -> None:
+        questions = open_questions(self._head.run.events, self._head.run.times[self._head.number])
+        if questions:
+            section_heading("Asked")
+        for question in questions:
             with ui.element("div").classes("line warning"):
-                ui.label(self._head.run.when(question.asked)).classes("when")
-                ui.label(shown_text(question.text)).classes("said")
+                ui.label(self._head.run.time_text(question.asked)).classes("when")
+                ui.label(safe_text(question.text)).classes("said")
             if self._operator:
                 self._buttons(question)
 
     def _buttons(self, question: Question) -> None:
         if not self._head.run.ended:
-            self._row("answer:", question, self._say)
-        self._row("if answered:", question, self._try)
+            self._row("answer:", question, self._send_answer)
+        self._row("if answered:", question, self._try_answer)
 
-    def _row(self, what: str, question: Question, act: Callable[[int, str], object]) -> None:
+    def _row(self, label: str, question: Question, on_answer: Callable[[int, str], object]) -> None:
         with ui.row().classes("gap-1 items-center under-line"):
-            ui.label(what).classes("dim")
+            ui.label(label).classes("dim")
             for name in (*question.names, NONE_OF_THE_MODELS[0]):
-                shown = name.replace("_", " ") if name != NONE_OF_THE_MODELS[0] else "none of them"
-                worded_button(shown_text(shown), partial(act, question.object_id, name))
+                label_of_name = (
+                    name.replace("_", " ") if name != NONE_OF_THE_MODELS[0] else "none of them"
+                )
+                text_button(safe_text(label_of_name), partial(on_answer, question.object_id, name))
 
-    def _say(self, object_id: int, name: str) -> None:
+    def _send_answer(self, object_id: int, name: str) -> None:
         try:
             put_answer(self._head.run.folder, object_id, name)
         except VisupError as fault:
-            ui.notify(shown_text(str(fault)), type="negative")
+            ui.notify(safe_text(str(fault)), type="negative")
             return
         ui.notify("Sent to the run; it takes effect with the next frame.")
 
-    async def _try(self, object_id: int, name: str) -> None:
+    async def _try_answer(self, object_id: int, name: str) -> None:
         number, steps = self._head.number + 1, len(self._head.run.frames)
         inquiry, key = self._state.inquiry, self._key
-        await show_tried(
-            lambda: inquiry(key).as_if_answered(number, object_id, name, steps),
+        await show_comparison(
+            lambda: inquiry(key).what_if_answered(number, object_id, name, steps),
             self._answer,
             self._head,
-            assumed=True,
+            show_assumption=True,
         )

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from nicegui import ui
 
-from visup.console.pages.frame import part_heading, worded_button
+from visup.console.pages.page_elements import section_heading, text_button
 
-KEYS = (
+SHORTCUTS = (
     (("Space",), "play or pause"),
     (("←", "→"), "one frame back or forward"),
     (("Shift", "←  →"), "ten frames"),
@@ -16,19 +16,19 @@ KEYS = (
 )
 
 
-def show_keys() -> None:
+def show_shortcuts() -> None:
     """Show the table over the page."""
     with ui.dialog(value=True) as dialog, ui.card().classes("card"):
         dialog.props('aria-label="Keys"')
-        part_heading("Keys")
+        section_heading("Keys")
         with ui.element("table").classes("keys"):
-            for keys, does in KEYS:
+            for keys, action in SHORTCUTS:
                 with ui.element("tr"):
                     with ui.element("td"):
                         for key in keys:
                             with ui.element("kbd"):
                                 ui.label(key)
                     with ui.element("td"):
-                        ui.label(does)
-        worded_button("Close", dialog.close, main=True)
+                        ui.label(action)
+        text_button("Close", dialog.close, primary=True)
     dialog.on("hide", dialog.delete)

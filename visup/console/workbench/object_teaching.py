@@ -14,7 +14,9 @@ MODELS = "console.models"
 """The model database in the `save_to` folder; further views are added to it."""
 
 
-def remember(run: RunView, number: int, object_id: int, name: str, folder: Path) -> TeachingResult:
+def teach_object(
+    run: RunView, number: int, object_id: int, name: str, folder: Path
+) -> TeachingResult:
     """Save the appearance of an object at a moment as a view of a model.
 
     Args:

@@ -21,7 +21,7 @@ VERDICT_COLOURS = {
     "unsafe": css(STATUS_COLOURS[Status.FAILED]),
     "in_progress": css(STATUS_COLOURS[Status.PROGRESSING]),
 }
-OTHER_COLOUR = "#5a6573"
+NEUTRAL_COLOUR = "#5a6573"
 
 
 @contextmanager
@@ -36,43 +36,43 @@ def page_frame(title: str) -> Iterator[None]:
             ui.link("visup", "/").classes("brand")
             ui.link("cameras", "/wall").classes("nav")
         with ui.element("h1").classes("crumb"):
-            ui.label(shown_text(title))
+            ui.label(safe_text(title))
         yield
         ui.space()
-        button("contrast", "Dark or light", lambda: dark.set_value(not dark.value))
+        icon_button("contrast", "Dark or light", lambda: dark.set_value(not dark.value))
 
 
-def part_heading(title: str) -> None:
+def section_heading(title: str) -> None:
     """The heading of a part of a panel."""
     with ui.element("h2").classes("part"):
         ui.label(title)
 
 
-def button(icon: str, says: str, act: Callable[[], object]) -> ui.button:
+def icon_button(icon: str, label: str, on_click: Callable[[], object]) -> ui.button:
     """A round icon button with a tooltip and an accessible name."""
-    made = ui.button(icon=icon, on_click=act, color=None)
-    made.props(f'flat round dense aria-label="{says}"').classes("icon")
-    made.tooltip(says)
-    return made
+    button = ui.button(icon=icon, on_click=on_click, color=None)
+    button.props(f'flat round dense aria-label="{label}"').classes("icon")
+    button.tooltip(label)
+    return button
 
 
-def worded_button(text: str, act: Callable[[], object], *, main: bool = False) -> ui.button:
+def text_button(text: str, on_click: Callable[[], object], *, primary: bool = False) -> ui.button:
     """A button with a text; the main one is highlighted."""
-    made = ui.button(text, on_click=act, color=None).props("dense no-caps unelevated")
-    return made.classes("act main" if main else "act")
+    button = ui.button(text, on_click=on_click, color=None).props("dense no-caps unelevated")
+    return button.classes("act main" if primary else "act")
 
 
 def badge(text: str, colour: str) -> ui.label:
     """A word on a coloured background."""
-    return ui.label(shown_text(text)).classes("state").style(f"background:{colour}")
+    return ui.label(safe_text(text)).classes("state").style(f"background:{colour}")
 
 
 def verdict_badge(verdict: str | None, *, ended: bool) -> ui.label:
     """The verdict of a run, or that it goes on."""
-    words = (verdict or ("no task" if ended else "running")).replace("_", " ")
-    return badge(words, VERDICT_COLOURS.get(verdict or "", OTHER_COLOUR))
+    text = (verdict or ("no task" if ended else "running")).replace("_", " ")
+    return badge(text, VERDICT_COLOURS.get(verdict or "", NEUTRAL_COLOUR))
 
 
-def shown_text(text: str) -> str:
+def safe_text(text: str) -> str:
     """A text that is safe to show: without bidirectional control characters."""
     return printable(text)
