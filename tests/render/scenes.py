@@ -1,4 +1,4 @@
-"""Small scenes for tests: bodies of known shape before a camera that looks along x."""
+"""Small scenes for tests: bodies of known shape in front of a camera that looks along x."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import trimesh
 
 from visup.render.scenario.scenario import Scenario
 
-QUIET = {"noise": 0.0, "blur_px": 0.0, "black": 0.0, "gamma": 1.0}
+IDEAL_SENSOR = {"noise": 0.0, "blur_px": 0.0, "black": 0.0, "gamma": 1.0}
 
 
 def scene(objects: list[dict[str, Any]], **changes: Any) -> Scenario:
@@ -24,13 +24,13 @@ def scene(objects: list[dict[str, Any]], **changes: Any) -> Scenario:
         },
         "light": {"sun": (-1, 0, 0), "earth": (0, 0, -1), "earthshine": 0.1},
         "background": {"kind": "stars", "count": 0},
-        "sensor": QUIET,
+        "sensor": IDEAL_SENSOR,
         "object": objects,
     }
     return Scenario.model_validate({**base, **changes})
 
 
-def thing(mesh: str | Path, at: tuple[float, float, float], **more: Any) -> dict[str, Any]:
+def scene_object(mesh: str | Path, at: tuple[float, float, float], **more: Any) -> dict[str, Any]:
     return {"name": "thing", "mesh": str(mesh), "label": 1, "track": [{"position": at}], **more}
 
 

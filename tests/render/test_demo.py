@@ -1,4 +1,4 @@
-"""What ships for the demo is what the renderer makes, and it tells the story it should."""
+"""The shipped files of the demo agree with the renderer."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from visup.render.output.truth import frame_truth, mission
 from visup.render.scenario.library import shipped_scenario
 
 DATA = Path(str(resources.files("visup") / "data"))
-CHECKED = (0, 137, 300, 431, 549)
+CHECKED_FRAMES = (0, 137, 300, 431, 549)
 
 
 @pytest.fixture(scope="module")
@@ -42,45 +42,49 @@ def clip() -> list[np.ndarray]:
         frames.append(np.asarray(frame))
 
 
-def test_what_ships_is_small() -> None:
+def test_shipped_files_are_small() -> None:
     assert (DATA / CLIP).stat().st_size < 3_000_000
     assert (DATA / RECORD).stat().st_size < 300_000
     assert (DATA / MODELS).stat().st_size < 4_000_000
 
 
-def test_the_clip_is_what_the_renderer_makes(clip: list[np.ndarray]) -> None:
+def test_the_shipped_clip_equals_the_rendered_frames(clip: list[np.ndarray]) -> None:
     scenario = shipped_scenario("sts87")
     renderer = Renderer(scenario)
     assert len(clip) == scenario.frame_count
-    for index in CHECKED:
-        error = renderer.picture(index).image.astype(float) - clip[index]
+    for index in CHECKED_FRAMES:
+        error = renderer.render(index).image.astype(float) - clip[index]
         assert 10 * np.log10(255**2 / np.mean(error**2)) > 34.0
         # Where there is structure a shift of one pixel would stand out far more than the codec does.
         assert np.percentile(abs(error), 99.9) < 30
 
 
-def test_another_frame_is_not_taken_for_it(clip: list[np.ndarray]) -> None:
-    picture = Renderer(shipped_scenario("sts87")).picture(137).image
+def test_the_comparison_tells_frames_apart(clip: list[np.ndarray]) -> None:
+    picture = Renderer(shipped_scenario("sts87")).render(137).image
     error = picture.astype(float) - clip[187]
     assert 10 * np.log10(255**2 / np.mean(error**2)) < 30.0
 
 
-def test_the_truth_is_what_the_renderer_says(record: dict[str, Any]) -> None:
+def test_the_shipped_truth_equals_the_rendered_truth(record: dict[str, Any]) -> None:
     scenario = shipped_scenario("sts87")
     renderer = Renderer(scenario)
     assert record["mission"] == mission(scenario)
-    for index in CHECKED:
-        said, found = (
+    for index in CHECKED_FRAMES:
+        shipped, found = (
             record["truth"]["frames"][index],
-            frame_truth(renderer.picture(index), record["truth"]["labels"]),
+            frame_truth(renderer.render(index), record["truth"]["labels"]),
         )
         for name in record["truth"]["labels"]:
-            assert said[name]["visible_px"] == pytest.approx(found[name]["visible_px"], rel=0.005)
-            np.testing.assert_allclose(said[name]["bbox"], found[name]["bbox"], atol=1)
-            assert said[name].get("range_m") == pytest.approx(found[name].get("range_m"), abs=1e-3)
+            assert shipped[name]["visible_px"] == pytest.approx(
+                found[name]["visible_px"], rel=0.005
+            )
+            np.testing.assert_allclose(shipped[name]["bbox"], found[name]["bbox"], atol=1)
+            assert shipped[name].get("range_m") == pytest.approx(
+                found[name].get("range_m"), abs=1e-3
+            )
 
 
-def middles(record: dict[str, Any], name: str) -> np.ndarray:
+def centres(record: dict[str, Any], name: str) -> np.ndarray:
     boxes = np.array([f[name]["bbox"] for f in record["truth"]["frames"]], float)
     return boxes[:, :2] + boxes[:, 2:] / 2
 
@@ -96,7 +100,7 @@ def gaps(record: dict[str, Any]) -> np.ndarray:
     )
 
 
-def test_the_story_has_its_three_parts(record: dict[str, Any]) -> None:
+def test_the_arm_approaches_touches_and_loses_the_satellite(record: dict[str, Any]) -> None:
     truth, gap, fps = record["truth"], gaps(record), 25
     contact = round(truth["stages"][0]["to_s"] * fps)
     assert truth["verdict"] == "failed"
@@ -109,8 +113,8 @@ def test_the_story_has_its_three_parts(record: dict[str, Any]) -> None:
     assert max(hidden[:contact]) < 0.01 * truth["frames"][0]["satellite"]["amodal_px"]
 
 
-def test_motion_is_slow_as_in_orbit_but_visible(record: dict[str, Any]) -> None:
-    at = middles(record, "satellite")
+def test_motion_is_slow_but_visible(record: dict[str, Any]) -> None:
+    at = centres(record, "satellite")
     before = np.linalg.norm(at[300] - at[0]) / 300
     after = np.linalg.norm(at[549] - at[325]) / 224
     assert 0.06 < before < 0.1
@@ -119,7 +123,7 @@ def test_motion_is_slow_as_in_orbit_but_visible(record: dict[str, Any]) -> None:
     assert 0.4 < (arm_left[0] - arm_left[300]) / 300 < 1.2
 
 
-def test_the_models_are_twenty_with_633_views() -> None:
+def test_the_database_has_20_models_with_633_views() -> None:
     database = ModelDatabase.open(DATA / MODELS)
     counts = dict.fromkeys(database.names(), 0)
     for view in database.views:
@@ -132,7 +136,7 @@ def test_the_models_are_twenty_with_633_views() -> None:
 
 
 @pytest.mark.parametrize("name", ["spartan", "guitar"])
-def test_a_model_built_anew_has_the_shipped_views(name: str, tmp_path: Path) -> None:
+def test_a_rebuilt_model_has_the_shipped_views(name: str, tmp_path: Path) -> None:
     shipped = ModelDatabase.open(DATA / MODELS)
     old = [v for v in shipped.views if v.name == name]
     anew = ModelDatabase.create(tmp_path / "anew.models", rendered_views(name, len(old)))
@@ -142,18 +146,20 @@ def test_a_model_built_anew_has_the_shipped_views(name: str, tmp_path: Path) -> 
         assert a.direction == pytest.approx(b.direction, abs=1e-6)
 
 
-def test_each_shipped_view_is_found_again_by_its_silhouette() -> None:
+def test_each_shipped_view_is_the_best_match_of_its_silhouette() -> None:
     database = ModelDatabase.open(DATA / MODELS)
     solid = mesh("spartan")
     body = trimesh.Trimesh(solid.vertices, solid.faces, process=False)
     views = [v for v in database.views if v.name == "spartan"][::5]
-    for view, seen in zip(views, render_views(body, half_sphere_directions(22)[::5]), strict=True):
-        best = database.query(seen.mask, top=1).matches[0]
+    for view, rendered in zip(
+        views, render_views(body, half_sphere_directions(22)[::5]), strict=True
+    ):
+        best = database.query(rendered.mask, top=1).matches[0]
         assert (best.view.name, best.view.number) == ("spartan", view.number)
         assert best.similarity > 0.99
 
 
-def test_both_actors_are_told_from_the_other_eighteen() -> None:
+def test_both_actors_are_recognised_among_twenty_models() -> None:
     database = ModelDatabase.open(DATA / MODELS)
     scenario = shipped_scenario("sts87")
     renderer = Renderer(scenario)

@@ -1,4 +1,4 @@
-"""Mission folders: what is written, and what is said to be true."""
+"""Mission folders: files and ground truth."""
 
 from __future__ import annotations
 
@@ -44,14 +44,14 @@ def frames(whole: list[int], visible: list[int]) -> list[dict[str, Any]]:
         ([0, 0], [0, 0], []),
     ],
 )
-def test_events_follow_from_what_is_visible(
+def test_presence_events_follow_from_visible_and_amodal_areas(
     whole: list[int], visible: list[int], expected: list[tuple[str, int]]
 ) -> None:
     events = presence_events("cat", frames(whole, visible))
     assert [(e["kind"], e["frame"]) for e in events] == expected
 
 
-def test_spin_is_read_off_the_motion() -> None:
+def test_spin_is_measured_from_poses() -> None:
     assert spin_deg_per_s(Renderer(shipped_scenario("over_earth")), "satellite") == pytest.approx(
         2.0, abs=0.01
     )
@@ -66,10 +66,10 @@ def mission(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def test_a_mission_folder_holds_what_it_should(mission: Path) -> None:
+def test_a_mission_folder_has_mission_and_truth(mission: Path) -> None:
     truth = json.loads((mission / "truth.json").read_text())
-    told = json.loads((mission / "mission.json").read_text())
-    assert told == {
+    record = json.loads((mission / "mission.json").read_text())
+    assert record == {
         "task": "dock",
         "actors": {"satellite": "spartan"},
         "fov_vertical_deg": 38.0,
@@ -85,7 +85,7 @@ def test_a_mission_folder_holds_what_it_should(mission: Path) -> None:
     assert ("entry", "astronaut") in kinds
 
 
-def test_masks_on_disk_agree_with_the_truth(mission: Path) -> None:
+def test_masks_agree_with_the_truth(mission: Path) -> None:
     truth = json.loads((mission / "truth.json").read_text())
     for frame in truth["frames"]:
         path = mission / "masks" / f"{frame['index']:05d}.png"
@@ -105,7 +105,7 @@ def test_the_video_has_every_frame(mission: Path) -> None:
     assert video.get(cv2.CAP_PROP_FPS) == pytest.approx(2.0)
 
 
-def test_a_folder_in_use_is_left_alone(mission: Path) -> None:
+def test_a_folder_that_is_not_empty_is_refused(mission: Path) -> None:
     s = shipped_scenario("crossing").resized(TINY)
     before = sorted(p.name for p in mission.iterdir())
     with pytest.raises(OutputError, match="not empty"):
@@ -113,30 +113,30 @@ def test_a_folder_in_use_is_left_alone(mission: Path) -> None:
     assert sorted(p.name for p in mission.iterdir()) == before
 
 
-def test_a_folder_that_cannot_be_made_is_said(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_made_is_reported(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match="cannot be made"):
         write_mission(shipped_scenario("crossing").resized(TINY), tmp_path / "file" / "out")
 
 
-def test_an_unknown_container_is_refused_before_anything_is_written(tmp_path: Path) -> None:
+def test_an_unknown_container_is_refused_before_writing(tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match=r"\.mov"):
         write_mission(shipped_scenario("crossing"), tmp_path / "out", ".mov")
     assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(("text", "size"), [("320x240", (320, 240)), ("16x8192", (16, 8192))])
-def test_a_size_is_read(text: str, size: tuple[int, int]) -> None:
+def test_sizes_are_parsed(text: str, size: tuple[int, int]) -> None:
     assert parse_size(text) == size
 
 
 @pytest.mark.parametrize("text", ["", "320", "320x", "ax b", "8x8", "320x9000", "3.5x20", "-3x20"])
-def test_what_is_no_size_is_refused(text: str) -> None:
+def test_invalid_sizes_are_refused(text: str) -> None:
     with pytest.raises(SettingsError, match="size"):
         parse_size(text)
 
 
-def test_the_command_renders_a_file(tmp_path: Path) -> None:
+def test_the_command_renders_a_scenario_file(tmp_path: Path) -> None:
     from visup.cli import app
 
     path = tmp_path / "s.toml"
@@ -146,13 +146,13 @@ def test_the_command_renders_a_file(tmp_path: Path) -> None:
         '[[object]]\nname = "pig"\nmesh = "pig"\nlabel = 1\ntrack = [{ position = [3, 0, 0] }]\n'
     )
     out = tmp_path / "out"
-    done = CliRunner().invoke(app, ["render", str(path), "--out", str(out), "--container", "avi"])
-    assert done.exit_code == 0, done.output
+    result = CliRunner().invoke(app, ["render", str(path), "--out", str(out), "--container", "avi"])
+    assert result.exit_code == 0, result.output
     assert (out / "video.avi").stat().st_size > 0
     assert len(list((out / "masks").iterdir())) == 4
 
 
-def test_without_the_extra_the_command_says_what_to_install(
+def test_without_the_extra_the_command_names_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setitem(sys.modules, "embreex", None)

@@ -1,4 +1,4 @@
-"""Stars, the Earth, and what the sensor makes of light."""
+"""Stars, the Earth, and the sensor."""
 
 from __future__ import annotations
 
@@ -8,7 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from visup.render.imaging.background import AIR_KM, EARTH_RADIUS_KM, clouds, earth, panorama, stars
+from visup.render.imaging.background import (
+    ATMOSPHERE_KM,
+    EARTH_RADIUS_KM,
+    clouds,
+    earth,
+    panorama,
+    stars,
+)
 from visup.render.imaging.sensor import expose
 from visup.render.imaging.texture import pattern
 from visup.render.scenario.optics import Camera, CameraKey, Earth, Light, Panorama, Sensor, Stars
@@ -18,9 +25,7 @@ CAMERA = Camera(size=(120, 120), track=(CameraKey(position=(0, 0, 0), look_at=(1
 
 @settings(max_examples=10, deadline=None)
 @given(seed=st.integers(0, 1000), angles=st.tuples(*[st.floats(-3, 3)] * 3))
-def test_stars_stand_still_while_the_camera_turns(
-    seed: int, angles: tuple[float, float, float]
-) -> None:
+def test_stars_are_fixed_in_the_world(seed: int, angles: tuple[float, float, float]) -> None:
     pose = Rotation.from_euler("xyz", angles)
     rolled = pose * Rotation.from_euler("z", 90, degrees=True)
     sky = Stars(seed=seed, count=3000)
@@ -30,8 +35,8 @@ def test_stars_stand_still_while_the_camera_turns(
     assert upright.max() > 0
 
 
-def look(angle: float, altitude: float) -> tuple[np.ndarray, bool]:
-    """Light and whether Earth or air is met, at an angle in radians off the way down (-z)."""
+def radiance_at(angle: float, altitude: float) -> tuple[np.ndarray, bool]:
+    """Radiance, and whether a ray at an angle from straight down (radians) hits Earth or atmosphere."""
     ray = np.array([[np.sin(angle), 0, -np.cos(angle)]], np.float32)
     settings = Earth(kind="earth", altitude_km=altitude)
     light, met = earth(ray, np.eye(3), settings, Light(sun=(0, 0, 1)))
@@ -39,16 +44,16 @@ def look(angle: float, altitude: float) -> tuple[np.ndarray, bool]:
 
 
 @pytest.mark.parametrize("altitude", [250.0, 400.0, 5000.0])
-def test_the_limb_stands_where_geometry_says(altitude: float) -> None:
+def test_the_limb_is_at_its_geometric_angle(altitude: float) -> None:
     far = EARTH_RADIUS_KM + altitude
     limb = np.arcsin(EARTH_RADIUS_KM / far)
-    top = np.arcsin((EARTH_RADIUS_KM + AIR_KM) / far)
-    assert look(limb - 0.001, altitude)[1]
-    assert look((limb + top) / 2, altitude)[1]
-    assert not look(top + 0.001, altitude)[1]
-    assert not look(np.pi, altitude)[1]
+    top = np.arcsin((EARTH_RADIUS_KM + ATMOSPHERE_KM) / far)
+    assert radiance_at(limb - 0.001, altitude)[1]
+    assert radiance_at((limb + top) / 2, altitude)[1]
+    assert not radiance_at(top + 0.001, altitude)[1]
+    assert not radiance_at(np.pi, altitude)[1]
     # The air fades towards space.
-    glow = [look(limb + k * (top - limb), altitude)[0].mean() for k in (0.1, 0.5, 0.9)]
+    glow = [radiance_at(limb + k * (top - limb), altitude)[0].mean() for k in (0.1, 0.5, 0.9)]
     assert glow[0] > glow[1] > glow[2] > 0
 
 
@@ -67,7 +72,7 @@ def test_more_clouds_cover_more() -> None:
     gamma=st.floats(1.0, 2.5),
     black=st.floats(0, 20),
 )
-def test_flat_light_gives_the_grey_of_the_formula(
+def test_uniform_light_gives_the_expected_grey(
     level: float, exposure: float, gamma: float, black: float
 ) -> None:
     sensor = Sensor(exposure=exposure, gamma=gamma, black=black, noise=0)
@@ -77,7 +82,7 @@ def test_flat_light_gives_the_grey_of_the_formula(
     assert (abs(image - expected) <= 0.51).all()
 
 
-def test_noise_has_its_size_and_its_seed() -> None:
+def test_noise_has_its_standard_deviation_and_depends_on_seed_and_frame() -> None:
     flat = np.full((200, 200, 3), 0.2, np.float32)
     sensor = Sensor(noise=3.0, blur_px=0)
     a, same, next_frame, other = (
@@ -89,7 +94,7 @@ def test_noise_has_its_size_and_its_seed() -> None:
     assert not np.array_equal(a, other)
 
 
-def test_the_panorama_stands_still_and_blends_its_colours() -> None:
+def test_the_panorama_is_fixed_and_blends_its_colours() -> None:
     random = np.random.default_rng(0)
     rays = random.standard_normal((5000, 3))
     rays = (rays / np.linalg.norm(rays, axis=1, keepdims=True)).astype(np.float32)

@@ -1,4 +1,4 @@
-"""Scenario files: what is accepted, and what is said of what is not."""
+"""Scenario files and their error messages."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ track = [{ position = [5, 0, 0] }]
 """
 
 
-def test_a_small_scenario_is_read() -> None:
+def test_a_small_scenario_is_parsed() -> None:
     s = parse_scenario(GOOD)
     assert s.frame_count == 10
     assert s.camera.fov_vertical_deg == 38
@@ -109,7 +109,9 @@ FAULTS = [
 
 
 @pytest.mark.parametrize(("old", "new", "where", "words"), FAULTS)
-def test_each_fault_is_named(old: str, new: str, where: str, words: str) -> None:
+def test_each_error_is_reported_with_its_setting(
+    old: str, new: str, where: str, words: str
+) -> None:
     assert old in GOOD
     with pytest.raises(SettingsError) as caught:
         parse_scenario(GOOD.replace(old, new, 1), "small.toml")
@@ -119,7 +121,7 @@ def test_each_fault_is_named(old: str, new: str, where: str, words: str) -> None
     assert words in text
 
 
-def test_two_objects_must_differ_in_name_and_label() -> None:
+def test_names_and_labels_of_objects_are_unique() -> None:
     again = GOOD[GOOD.index("[[object]]") :]
     with pytest.raises(SettingsError, match="name 'dog'"):
         parse_scenario(GOOD + again)
@@ -127,14 +129,14 @@ def test_two_objects_must_differ_in_name_and_label() -> None:
         parse_scenario(GOOD + again.replace('name = "dog"', 'name = "cat"'))
 
 
-def test_several_faults_are_told_at_once() -> None:
+def test_several_errors_are_reported_together() -> None:
     bad = GOOD.replace("fps = 5", "fps = -1").replace("label = 3", "label = -3")
     with pytest.raises(ErrorGroup) as caught:
         parse_scenario(bad, "small.toml")
     assert len(caught.value.errors) == 2
 
 
-def test_a_fault_points_to_its_line_when_the_line_is_clear() -> None:
+def test_an_error_has_its_line_if_that_is_unique() -> None:
     with pytest.raises(SettingsError) as caught:
         parse_scenario(GOOD.replace("fps = 5", "fps = -1"), "small.toml")
     place = caught.value.where
@@ -145,7 +147,9 @@ def test_a_fault_points_to_its_line_when_the_line_is_clear() -> None:
 @pytest.mark.parametrize(
     ("content", "words"), [(b"\xff\xfe\x00", "text file"), (b"fps = = 3", "not TOML")]
 )
-def test_what_is_no_scenario_is_refused(tmp_path: Path, content: bytes, words: str) -> None:
+def test_files_that_are_not_scenarios_are_refused(
+    tmp_path: Path, content: bytes, words: str
+) -> None:
     path = tmp_path / "x.toml"
     path.write_bytes(content)
     with pytest.raises(SettingsError, match=words):
@@ -153,12 +157,12 @@ def test_what_is_no_scenario_is_refused(tmp_path: Path, content: bytes, words: s
 
 
 @pytest.mark.parametrize("word", ["missing.toml", "no_such_scenario"])
-def test_a_missing_scenario_is_said(word: str) -> None:
+def test_a_missing_scenario_is_reported(word: str) -> None:
     with pytest.raises(VisupError, match=r"cannot be read|there is no scenario"):
         find_scenario(word)
 
 
-def test_mesh_files_are_looked_for_beside_the_scenario(tmp_path: Path) -> None:
+def test_mesh_files_are_relative_to_the_scenario(tmp_path: Path) -> None:
     box_file(tmp_path, (1, 1, 1))
     path = tmp_path / "s.toml"
     path.write_text(GOOD.replace('mesh = "dog"', 'mesh = "box.ply"'))
@@ -166,23 +170,23 @@ def test_mesh_files_are_looked_for_beside_the_scenario(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("mesh", ["unicorn", "missing.ply"])
-def test_a_missing_mesh_is_said(tmp_path: Path, mesh: str) -> None:
+def test_a_missing_mesh_is_reported(tmp_path: Path, mesh: str) -> None:
     path = tmp_path / "s.toml"
     path.write_text(GOOD.replace('mesh = "dog"', f'mesh = "{mesh}"'))
     with pytest.raises(SettingsError, match="mesh"):
         Renderer(load_scenario(path))
 
 
-def test_an_arm_out_of_reach_says_which_and_when() -> None:
+def test_an_arm_out_of_reach_is_reported_with_name_and_time() -> None:
     far = GOOD.replace(
         'mesh = "dog"',
         'mesh = "arm"\ntip = [{ position = [90, 0, 0], direction = [1, 0, 0] }]',
     )
     with pytest.raises(SettingsError, match=r"dog at 0\.00 s.*cannot reach"):
-        Renderer(parse_scenario(far)).picture(0)
+        Renderer(parse_scenario(far)).render(0)
 
 
-def test_shipped_scenarios_are_sound() -> None:
+def test_shipped_scenarios_are_valid() -> None:
     assert {"sts87", "capture_succeeds", "over_earth", "crossing"} <= set(shipped_names())
     for name in shipped_names():
         s = shipped_scenario(name)

@@ -1,4 +1,4 @@
-"""Random worlds: the same seed gives the same bytes, and every file can be read back and holds together."""
+"""Random worlds: they are deterministic, and their files are readable and consistent."""
 
 from __future__ import annotations
 
@@ -15,26 +15,28 @@ from numpy.typing import NDArray
 
 from visup.agent.model.errors import SettingsError
 from visup.evaluation.machines.clips import clip_folders, read_brief, read_truth
-from visup.render.worlds.frames import WorldRenderer
 from visup.render.worlds.kinds.catalogue import KINDS, random_world
-from visup.render.worlds.lesson import lesson
+from visup.render.worlds.teaching_clip import teaching_world
 from visup.render.worlds.world import FPS, World
+from visup.render.worlds.world_renderer import WorldRenderer
 from visup.render.worlds.writer import write_world
 from visup.tasks import load_tasks
 from visup.tasks.grammar.structure import task_actors
 
 SMALL = (96, 72)
 BAD = ("failing", "unsafe")
-WAYS = [(kind.name, way) for kind in KINDS.values() for way in kind.outcomes]
+OUTCOMES = [(kind.name, outcome) for kind in KINDS.values() for outcome in kind.outcomes]
 
 
 def small(world: World) -> World:
-    """The world at every 15th of its frames, and few pixels."""
-    kept = list(range(0, world.frames, FPS))
+    """The world at every 15th frame, with few pixels."""
+    indices = list(range(0, world.frames, FPS))
     view = world.viewpoint
-    turned = replace(view, turns=view.turns[kept], zoom=view.zoom[kept])
-    things = [replace(t, poses=t.poses[kept]) if t.moves else t for t in world.things]
-    return replace(world, size=SMALL, viewpoint=turned, things=tuple(things), frames=len(kept))
+    viewpoint = replace(view, rotations_deg=view.rotations_deg[indices], zoom=view.zoom[indices])
+    bodies = [replace(t, poses=t.poses[indices]) if t.moves else t for t in world.bodies]
+    return replace(
+        world, size=SMALL, viewpoint=viewpoint, bodies=tuple(bodies), frames=len(indices)
+    )
 
 
 @pytest.fixture(scope="module", params=sorted(KINDS))
@@ -66,14 +68,14 @@ def test_the_same_seed_gives_the_same_bytes(tmp_path: Path) -> None:
     assert dict(files(first)) == dict(files(second))
 
 
-def test_frames_do_not_depend_on_those_before() -> None:
+def test_frames_of_worlds_do_not_depend_on_earlier_ones() -> None:
     world = small(random_world("charge", 2))
-    forth = WorldRenderer(world)
-    forth.picture(0)
-    assert (forth.picture(4).image == WorldRenderer(world).picture(4).image).all()
+    renderer = WorldRenderer(world)
+    renderer.render(0)
+    assert (renderer.render(4).image == WorldRenderer(world).render(4).image).all()
 
 
-def test_a_world_is_read_as_shared_ones_are(folder: Path) -> None:
+def test_a_world_can_be_read_as_an_evaluation_clip(folder: Path) -> None:
     brief, truth = read_brief(folder), read_truth(folder)
     assert {o.name for o in brief.actors} == set(read(folder / "truth.json")["roles"])
     assert truth.stages
@@ -81,7 +83,7 @@ def test_a_world_is_read_as_shared_ones_are(folder: Path) -> None:
     assert {a for t in tasks for a in task_actors(t)} <= {o.name for o in brief.actors}
 
 
-def test_the_video_and_the_masks_have_a_picture_for_each_frame(folder: Path) -> None:
+def test_video_and_masks_have_every_frame(folder: Path) -> None:
     count = len(read(folder / "truth.json")["frames"])
     video = cv2.VideoCapture(str(folder / "video.mp4"))
     read_back = 0
@@ -90,62 +92,62 @@ def test_the_video_and_the_masks_have_a_picture_for_each_frame(folder: Path) -> 
     assert (read_back, len(masks(folder))) == (count, count)
 
 
-def test_masks_hold_labels_alone_and_none_that_means_unscored(folder: Path) -> None:
+def test_masks_have_only_labels_and_not_the_unscored_value(folder: Path) -> None:
     labels = set(read(folder / "truth.json")["labels"].values())
     assert 128 not in labels
     assert all(set(np.unique(m)) <= labels | {0} for m in masks(folder))
 
 
-def test_outlines_lie_in_the_picture_and_on_their_thing(folder: Path) -> None:
+def test_outlines_are_within_the_image_and_on_their_object(folder: Path) -> None:
     truth = read(folder / "truth.json")
-    for actor, shown in read(folder / "brief.json")["teach"].items():
-        corners = np.array(shown["polygon"])
+    for actor, outline in read(folder / "brief.json")["teach"].items():
+        corners = np.array(outline["polygon"])
         assert (corners >= 0).all()
         assert (corners < SMALL).all()
         drawn = cv2.fillPoly(np.zeros(SMALL[::-1], np.uint8), [corners], 1) > 0
-        seen = masks(folder.parent / shown["clip"])
-        thing = seen[shown["frame"]] == truth["labels"][truth["roles"][actor]]
+        seen = masks(folder.parent / outline["clip"])
+        thing = seen[outline["frame"]] == truth["labels"][truth["roles"][actor]]
         assert np.count_nonzero(drawn & thing) > 0.5 * np.count_nonzero(drawn)
 
 
-@pytest.mark.parametrize(("kind", "way"), WAYS)
+@pytest.mark.parametrize(("kind", "outcome"), OUTCOMES)
 @pytest.mark.parametrize("seed", [0, 1])
-def test_truth_holds_together(kind: str, way: str, seed: int) -> None:
-    world = random_world(kind, seed, way)
-    course, end = world.course, world.frames / FPS
-    begins = [s.from_s for s in course.stages]
+def test_the_truth_of_every_outcome_is_consistent(kind: str, outcome: str, seed: int) -> None:
+    world = random_world(kind, seed, outcome)
+    truth, end = world.truth, world.frames / FPS
+    begins = [s.from_s for s in truth.stages]
     assert begins == sorted(begins)
-    assert all(s.from_s <= s.to_s for s in course.stages)
+    assert all(s.from_s <= s.to_s for s in truth.stages)
     assert begins[-1] < end
-    bad = [s.outcome in BAD for s in course.stages]
-    assert any(bad) == (course.verdict in ("failed", "interrupted"))
+    bad = [s.outcome in BAD for s in truth.stages]
+    assert any(bad) == (truth.verdict in ("failed", "interrupted"))
     assert not any(bad[:-1])
-    assert course.verdict in (course.accept or (course.verdict,))
-    assert 8 <= end <= 15 or way == "in_progress"
+    assert truth.verdict in (truth.accept or (truth.verdict,))
+    assert 8 <= end <= 15 or outcome == "in_progress"
     actors = set(world.actors)
-    assert {c for contact in course.contacts for c in (contact.a, contact.b)} <= actors
-    assert all(len(t.poses) in (1, *range(world.frames, 400)) for t in world.things)
+    assert {c for contact in truth.contacts for c in (contact.a, contact.b)} <= actors
+    assert all(len(t.poses) in (1, *range(world.frames, 400)) for t in world.bodies)
 
 
 @pytest.mark.parametrize("kind", sorted(KINDS))
 def test_every_stage_of_the_truth_is_in_the_task_file(kind: str) -> None:
-    for way in KINDS[kind].outcomes:
-        world = random_world(kind, 7, way)
-        assert all(f"<{s.stage}>" in world.task_text for s in world.course.stages)
+    for outcome in KINDS[kind].outcomes:
+        world = random_world(kind, 7, outcome)
+        assert all(f"<{s.stage}>" in world.task_text for s in world.truth.stages)
 
 
-def test_things_may_be_shown_on_another_day(tmp_path: Path) -> None:
+def test_objects_may_be_outlined_in_another_clip(tmp_path: Path) -> None:
     worlds = (small(random_world("conveyor", seed, "ok")) for seed in range(20))
-    world = next(w for w in worlds if lesson(w) is not None)
+    world = next(w for w in worlds if teaching_world(w) is not None)
     write_world(replace(world, size=(240, 180)), tmp_path / "w")
-    taught = read(tmp_path / "w" / "brief.json")["teach"]
-    assert {shown["clip"] for shown in taught.values()} == {"w-shown"}
+    outlines = read(tmp_path / "w" / "brief.json")["teach"]
+    assert {outline["clip"] for outline in outlines.values()} == {"w-shown"}
     frames = masks(tmp_path / "w-shown")
-    assert len(frames) == len(taught)
+    assert len(frames) == len(outlines)
     assert len(clip_folders(tmp_path)) == 1
 
 
-def test_what_does_not_exist_is_refused() -> None:
+def test_unknown_kinds_and_outcomes_are_refused() -> None:
     with pytest.raises(SettingsError, match="no kind"):
         random_world("knitting", 0)
     with pytest.raises(SettingsError, match="cannot go"):

@@ -102,4 +102,4 @@ def test_a_part_carried_past_its_destination_is_still_carried_to_it() -> None:
 
 def test_impossible_outcomes_of_a_world_do_not_block_others() -> None:
     worlds = worlds_of("crane", 11, bad_outcomes("crane"), 4, {"container", "truck"})
-    assert [w.course.outcome for w in worlds] == ["miss", "carry_off", "miss", "carry_off"]
+    assert [w.truth.outcome for w in worlds] == ["miss", "carry_off", "miss", "carry_off"]

@@ -112,7 +112,7 @@ def evaluate_kind(trial: LearningTrial) -> dict[str, Any]:
     wrong = []
     for world in (*others, *bad):
         success = judged(task, world_minds(world)).verdict is Verdict.SUCCEEDED
-        meant = world.course.outcome == "ok"
+        meant = world.truth.outcome == "ok"
         figures["accepted" if meant else "refused"] += success == meant
         wrong += [] if success == meant else [world.name]
     actions, written = actions_of(task), actions_of(parse_task(taught[0].task_text))
@@ -127,7 +127,7 @@ def bad_outcomes(kind: str) -> tuple[str, ...]:
     """The outcomes with which a world of a kind fails."""
     found = []
     for outcome in KINDS[kind].outcomes[1:]:
-        verdict = random_world(kind, 0, outcome).course.verdict
+        verdict = random_world(kind, 0, outcome).truth.verdict
         found += [outcome] if verdict not in ("succeeded", NOT_OVER) else []
     return tuple(found)
 

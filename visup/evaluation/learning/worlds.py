@@ -21,9 +21,9 @@ from visup.agent import (
     Percept,
 )
 from visup.evaluation.machines.mask_regions import role_behaviours
-from visup.render.worlds.frames import WorldRenderer
 from visup.render.worlds.plate import PlateCamera
 from visup.render.worlds.world import FPS, World
+from visup.render.worlds.world_renderer import WorldRenderer
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import reasoning_agent
 

@@ -77,9 +77,9 @@ def orbit_models(folder: Path, jobs: int = 1) -> Path:
     """
     from visup.percepts.shape.building.database_builder import build_database
     from visup.render.meshes.spacecraft import MESHES, write_meshes
-    from visup.render.orbits.strangers import HIDDEN
+    from visup.render.orbits.unexpected_objects import UNKNOWN_MESHES
 
-    files = write_meshes(sorted(set(MESHES) - {*HIDDEN, *SCENERY}), folder)
+    files = write_meshes(sorted(set(MESHES) - {*UNKNOWN_MESHES, *SCENERY}), folder)
     path = folder / "orbit.models"
     build_database(path, files, {"arm": _arm_masks()}, clusters=_ARM_EXEMPLARS, jobs=jobs)
     return path

@@ -11,19 +11,19 @@ from scipy.ndimage import map_coordinates
 
 from visup.render.imaging.texture import pattern
 from visup.render.scenario.optics import Camera, Earth, Light, Panorama, Stars
-from visup.render.scenario.trajectories import spin_about
+from visup.render.scenario.trajectories import rotation_about
 
 Floats = NDArray[np.float32]
 EARTH_RADIUS_KM = 6371.0
 MAP_SIDE = 1536
 """Side of the cloud map, pixels."""
 
-AIR_KM = 60.0
+ATMOSPHERE_KM = 60.0
 """Height of the atmosphere that appears as the bright limb of the Earth."""
 
 OCEAN = np.array([0.30, 0.17, 0.08], np.float32)
 CLOUD = np.array([0.95, 0.95, 0.95], np.float32)
-AIR = np.array([0.90, 0.65, 0.45], np.float32)
+ATMOSPHERE = np.array([0.90, 0.65, 0.45], np.float32)
 
 
 def stars(camera: Camera, rotation: NDArray[np.float64], settings: Stars | Earth) -> Floats:
@@ -41,13 +41,13 @@ def stars(camera: Camera, rotation: NDArray[np.float64], settings: Stars | Earth
     random = np.random.default_rng(settings.seed)
     directions = random.standard_normal((settings.count, 3))
     # Three times as many stars per magnitude, as in the real sky.
-    light = 3.0 ** (-4.0 * random.random(settings.count)) * min(settings.brightness, 1.0)
-    seen = directions @ rotation
-    front = seen[:, 2] > 0
-    x = camera.focal_px * seen[front, 0] / seen[front, 2] + (width - 1) / 2
-    y = camera.focal_px * seen[front, 1] / seen[front, 2] + (height - 1) / 2
+    brightness = 3.0 ** (-4.0 * random.random(settings.count)) * min(settings.brightness, 1.0)
+    in_camera = directions @ rotation
+    in_front = in_camera[:, 2] > 0
+    x = camera.focal_px * in_camera[in_front, 0] / in_camera[in_front, 2] + (width - 1) / 2
+    y = camera.focal_px * in_camera[in_front, 1] / in_camera[in_front, 2] + (height - 1) / 2
     grey = np.zeros((height, width), np.float32)
-    _splat(grey, x, y, light[front])
+    _splat(grey, x, y, brightness[in_front])
     return np.repeat(grey[..., None], 3, axis=2)
 
 
@@ -58,7 +58,7 @@ def earth(
 
     Args:
         rays: (N, 3) float32 unit directions, world.
-        rotation: (3, 3), from the world to the Earth's own frame; see `ground_turn`.
+        rotation: (3, 3), from the world to the Earth's own frame; see `ground_rotation`.
         settings: Altitude, clouds, brightness.
         light: Directions of the Earth and the sun.
 
@@ -67,25 +67,25 @@ def earth(
     """
     down = np.asarray(light.earth, float) / np.linalg.norm(light.earth)
     sun = np.asarray(light.sun, float) / np.linalg.norm(light.sun)
-    far = EARTH_RADIUS_KM + settings.altitude_km
-    along = rays.astype(np.float64) @ (down * far)
-    closest = np.sqrt(np.maximum(far**2 - along**2, 0.0))
+    orbit_radius = EARTH_RADIUS_KM + settings.altitude_km
+    along = rays.astype(np.float64) @ (down * orbit_radius)
+    closest = np.sqrt(np.maximum(orbit_radius**2 - along**2, 0.0))
     closest = np.where(along > 0, closest, np.inf)
     radiance = np.zeros((len(rays), 3), np.float32)
-    air = np.clip(1.0 - (closest - EARTH_RADIUS_KM) / AIR_KM, 0.0, 1.0)
+    air = np.clip(1.0 - (closest - EARTH_RADIUS_KM) / ATMOSPHERE_KM, 0.0, 1.0)
     glow = (closest >= EARTH_RADIUS_KM) & (air > 0)
-    radiance[glow] = (0.5 * air[glow] ** 2)[:, None] * AIR
+    radiance[glow] = (0.5 * air[glow] ** 2)[:, None] * ATMOSPHERE
     ground = closest < EARTH_RADIUS_KM
     distance = along[ground] - np.sqrt(EARTH_RADIUS_KM**2 - closest[ground] ** 2)
-    points = rays[ground] * distance[:, None] - down * far
+    points = rays[ground] * distance[:, None] - down * orbit_radius
     normals = points / EARTH_RADIUS_KM
-    lit = np.clip(normals @ sun, 0.0, None) * 0.85 + 0.15
-    extent = float(np.sqrt(1 - (EARTH_RADIUS_KM / far) ** 2))
-    ground_at = normals @ rotation @ _across(down)
-    cover = clouds(ground_at, extent, settings.clouds, settings.seed)[:, None]
-    surface = OCEAN * (1 - cover) + CLOUD * cover
+    illumination = np.clip(normals @ sun, 0.0, None) * 0.85 + 0.15
+    extent = float(np.sqrt(1 - (EARTH_RADIUS_KM / orbit_radius) ** 2))
+    ground_points = normals @ rotation @ _perpendicular_axes(down)
+    cloud_cover = clouds(ground_points, extent, settings.clouds, settings.seed)[:, None]
+    surface = OCEAN * (1 - cloud_cover) + CLOUD * cloud_cover
     haze = np.clip((closest[ground] / EARTH_RADIUS_KM - 0.97) / 0.03, 0.0, 1.0)[:, None] ** 2 * 0.5
-    radiance[ground] = (surface * (1 - haze) + AIR * haze) * lit[:, None]
+    radiance[ground] = (surface * (1 - haze) + ATMOSPHERE * haze) * illumination[:, None]
     return radiance * np.float32(settings.brightness), glow | ground
 
 
@@ -104,10 +104,10 @@ def panorama(rays: Floats, settings: Panorama) -> Floats:
     return np.asarray(dark + np.clip(blend, 0, 1) * (light - dark), np.float32)
 
 
-def ground_turn(settings: Earth, time: float) -> NDArray[np.float64]:
+def ground_rotation(settings: Earth, time: float) -> NDArray[np.float64]:
     """(3, 3) rotation of the ground under the camera at a time."""
-    turn = spin_about(np.asarray(settings.turn_axis, float), settings.turn_deg_per_s * time)
-    return np.asarray(turn.as_matrix())
+    rotation = rotation_about(np.asarray(settings.turn_axis, float), settings.turn_deg_per_s * time)
+    return np.asarray(rotation.as_matrix())
 
 
 def clouds(ground: NDArray[np.float64], extent: float, amount: float, seed: int) -> Floats:
@@ -124,9 +124,9 @@ def clouds(ground: NDArray[np.float64], extent: float, amount: float, seed: int)
     Returns:
         (N,) float32, 0 to 1.
     """
-    drawn = _cloud_map(extent, amount, seed)
-    at = (ground / extent + 1) * (MAP_SIDE - 1) / 2
-    return np.asarray(map_coordinates(drawn, at.T, order=1, mode="mirror"), np.float32)
+    cloud_map = _cloud_map(extent, amount, seed)
+    pixels = (ground / extent + 1) * (MAP_SIDE - 1) / 2
+    return np.asarray(map_coordinates(cloud_map, pixels.T, order=1, mode="mirror"), np.float32)
 
 
 @lru_cache(maxsize=4)
@@ -144,10 +144,10 @@ def _cloud_map(extent: float, amount: float, seed: int) -> Floats:
     return np.asarray(np.clip((total - level) / 0.3 + 0.4, 0.0, 1.0), np.float32)
 
 
-def _across(down: NDArray[np.float64]) -> NDArray[np.float64]:
+def _perpendicular_axes(down: NDArray[np.float64]) -> NDArray[np.float64]:
     """(3, 2): two directions perpendicular to one and to each other."""
-    other = np.eye(3)[int(np.argmin(np.abs(down)))]
-    first = np.cross(down, other)
+    helper = np.eye(3)[int(np.argmin(np.abs(down)))]
+    first = np.cross(down, helper)
     first /= np.linalg.norm(first)
     return np.stack([first, np.cross(down, first)], axis=1)
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from visup.render.meshes.solids import Solid
 
 Floats = NDArray[np.float32]
-OFFSET = 1e-3
+SHADOW_OFFSET = 1e-3
 """Offset of the origin of a shadow ray from its surface, metres, to avoid hitting it again."""
 
 
@@ -62,15 +62,13 @@ class RayCaster:
 
     def __init__(self, bodies: Sequence[Body]) -> None:
         self.bodies = tuple(bodies)
-        placed = [b.solid.transformed(b.pose) for b in bodies]
-        vertices = np.concatenate([s.vertices for s in placed]).astype(np.float32)
-        before = np.cumsum([0, *(len(s.vertices) for s in placed)])
-        faces = np.concatenate([s.faces + n for s, n in zip(placed, before, strict=False)])
-        self.body = np.repeat(
-            np.arange(len(bodies), dtype=np.int32), [len(s.faces) for s in placed]
-        )
-        self.normals = np.concatenate([s.normals for s in placed]).astype(np.float32)
-        self.albedo = np.concatenate([s.albedo for s in placed]).astype(np.float32)
+        posed = [b.solid.transformed(b.pose) for b in bodies]
+        vertices = np.concatenate([s.vertices for s in posed]).astype(np.float32)
+        offsets = np.cumsum([0, *(len(s.vertices) for s in posed)])
+        faces = np.concatenate([s.faces + n for s, n in zip(posed, offsets, strict=False)])
+        self.body = np.repeat(np.arange(len(bodies), dtype=np.int32), [len(s.faces) for s in posed])
+        self.normals = np.concatenate([s.normals for s in posed]).astype(np.float32)
+        self.albedo = np.concatenate([s.albedo for s in posed]).astype(np.float32)
         self._scene = rtcore_scene.EmbreeScene()
         # With shared vertices it is made in half the time.
         self._mesh = TriangleMesh(self._scene, vertices, faces.astype(np.int32))
@@ -82,16 +80,16 @@ class RayCaster:
             return Hits(nothing, nothing, np.zeros(0, np.float32))
         result = self._scene.run(origins, directions, output=1)
         face = np.asarray(result["primID"], np.int32)
-        met = face >= 0
-        body = np.where(met, self.body[np.where(met, face, 0)], -1).astype(np.int32)
-        distance = np.where(met, result["tfar"], np.inf).astype(np.float32)
-        return Hits(body, np.where(met, face, -1).astype(np.int32), distance)
+        hit = face >= 0
+        body = np.where(hit, self.body[np.where(hit, face, 0)], -1).astype(np.int32)
+        distance = np.where(hit, result["tfar"], np.inf).astype(np.float32)
+        return Hits(body, np.where(hit, face, -1).astype(np.int32), distance)
 
     def from_pinhole(self, directions: Floats) -> Hits:
         """`cast` for rays that leave the camera."""
         return self.cast(np.zeros_like(directions), directions)
 
-    def blocked(self, points: Floats, normals: Floats, direction: Floats) -> NDArray[np.bool_]:
+    def occluded(self, points: Floats, normals: Floats, direction: Floats) -> NDArray[np.bool_]:
         """Whether something blocks a distant light from points.
 
         Args:
@@ -104,7 +102,7 @@ class RayCaster:
         """
         if len(points) == 0:
             return np.zeros(0, bool)
-        scale = OFFSET * np.maximum(1.0, np.linalg.norm(points, axis=1, keepdims=True) * 0.1)
+        scale = SHADOW_OFFSET * np.maximum(1.0, np.linalg.norm(points, axis=1, keepdims=True) * 0.1)
         origins = (points + normals * scale).astype(np.float32)
         directions = np.ascontiguousarray(np.broadcast_to(direction, origins.shape), np.float32)
         return np.asarray(self._scene.run(origins, directions, query="INTERSECT")) >= 0

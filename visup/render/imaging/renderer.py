@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.render.imaging import background as sky
+from visup.render.imaging import background as backgrounds
 from visup.render.imaging.raycast import Body, Hits, RayCaster
 from visup.render.imaging.scene_poses import PosedScene
 from visup.render.imaging.sensor import expose
@@ -21,7 +21,7 @@ from visup.render.scenario.trajectories import (
 )
 
 Floats = NDArray[np.float32]
-SUBRAYS = 3
+EDGE_SAMPLES = 3
 """Rays along each side of a pixel on an edge; other pixels have one."""
 
 
@@ -44,21 +44,21 @@ class RenderedFrame:
     poses: dict[str, Matrix]
 
 
-def pixel_rays(camera: Camera, at: NDArray[np.float64] | None = None) -> Floats:
+def pixel_rays(camera: Camera, points: NDArray[np.float64] | None = None) -> Floats:
     """Directions of rays through points of the image.
 
     Args:
         camera: Size and field of view; square pixels, the optical axis through the centre of the image.
-        at: (N, 2) points (x, y) in pixels; None for the centres of all pixels, row by row.
+        points: (N, 2) points (x, y) in pixels; None for the centres of all pixels, row by row.
 
     Returns:
         (N, 3) float32 in the camera's frame, z = 1.
     """
     width, height = camera.size
-    if at is None:
+    if points is None:
         y, x = np.mgrid[:height, :width]
-        at = np.column_stack([x.ravel(), y.ravel()]).astype(float)
-    flat = (at - [(width - 1) / 2, (height - 1) / 2]) / camera.focal_px
+        points = np.column_stack([x.ravel(), y.ravel()]).astype(float)
+    flat = (points - [(width - 1) / 2, (height - 1) / 2]) / camera.focal_px
     return np.column_stack([flat, np.ones(len(flat))]).astype(np.float32)
 
 
@@ -94,10 +94,10 @@ class Renderer:
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario
         self.scene = PosedScene(scenario)
-        self._rays: tuple[float, Floats] | None = None
-        self._sky: tuple[object, Floats] | None = None
+        self._cached_rays: tuple[float, Floats] | None = None
+        self._cached_background: tuple[object, Floats] | None = None
 
-    def picture(self, index: int) -> RenderedFrame:
+    def render(self, index: int) -> RenderedFrame:
         """Render one frame.
 
         Args:
@@ -110,11 +110,11 @@ class Renderer:
         bodies = self.scene.bodies(view.time, view.pose)
         caster = RayCaster(bodies)
         width, height = view.camera.size
-        inside = self._window(bodies, view)
-        hits = _spread(caster.from_pinhole(view.rays[inside]), inside)
-        behind = self._background(view).reshape(-1, 3)
-        radiance = self._shade(caster, hits, view.rays, behind, view)
-        self._smooth_edges(radiance, caster, hits, behind, view)
+        inside = self._bounding_window(bodies, view)
+        hits = _scatter(caster.from_pinhole(view.rays[inside]), inside)
+        background = self._background(view).reshape(-1, 3)
+        radiance = self._shade(caster, hits, view.rays, background, view)
+        self._antialias_edges(radiance, caster, hits, background, view)
         sensor = self.scenario.sensor.at(view.time)
         image = expose(radiance.reshape(height, width, 3), sensor, self.scenario.seed, index)
         return RenderedFrame(
@@ -126,29 +126,29 @@ class Renderer:
         )
 
     def mask(self, index: int) -> NDArray[np.uint8]:
-        """Only the mask of a frame, (H, W) uint8, as from `picture` but much faster."""
+        """Only the mask of a frame, (H, W) uint8, as from `render` but much faster."""
         view = self.view(index)
         bodies = self.scene.bodies(view.time, view.pose)
-        inside = self._window(bodies, view)
+        inside = self._bounding_window(bodies, view)
         return self._labels(
-            bodies, _spread(RayCaster(bodies).from_pinhole(view.rays[inside]), inside)
+            bodies, _scatter(RayCaster(bodies).from_pinhole(view.rays[inside]), inside)
         )
 
     def view(self, index: int) -> CameraView:
         """Camera and light in a frame."""
         time = index / self.scenario.camera.fps
         camera = self.scenario.camera.at(time)
-        if self._rays is None or self._rays[0] != camera.fov_vertical_deg:
-            self._rays = (camera.fov_vertical_deg, pixel_rays(camera))
+        if self._cached_rays is None or self._cached_rays[0] != camera.fov_vertical_deg:
+            self._cached_rays = (camera.fov_vertical_deg, pixel_rays(camera))
         light = self.scenario.light.at(time)
-        return CameraView(time, camera, self.scene.camera_pose(time), light, self._rays[1])
+        return CameraView(time, camera, self.scene.camera_pose(time), light, self._cached_rays[1])
 
     def _labels(self, bodies: list[Body], hits: Hits) -> NDArray[np.uint8]:
         """(H, W): the label that each ray hit."""
         width, height = self.scenario.camera.size
         return np.array([*(b.label for b in bodies), 0], np.uint8)[hits.body].reshape(height, width)
 
-    def _window(self, bodies: list[Body], view: CameraView) -> NDArray[np.bool_]:
+    def _bounding_window(self, bodies: list[Body], view: CameraView) -> NDArray[np.bool_]:
         """(H * W,): the pixels inside the bounding boxes of the projected bodies."""
         width, height = view.camera.size
         window = np.zeros((height, width), bool)
@@ -165,7 +165,7 @@ class Renderer:
                 continue
             visible = int(np.count_nonzero(hits.body == number))
             # Only where another body is in front may it be hidden.
-            window = self._window([body], view) & (hits.body >= 0) & (hits.body != number)
+            window = self._bounding_window([body], view) & (hits.body >= 0) & (hits.body != number)
             hidden = RayCaster([body]).from_pinhole(view.rays[window]).body if window.any() else ()
             counts[body.name] = visible + int(np.count_nonzero(np.asarray(hidden) >= 0))
         return counts
@@ -174,68 +174,72 @@ class Renderer:
         """(H, W, 3) radiance; cached between frames while it does not change."""
         settings = self.scenario.background
         moving = isinstance(settings, Earth) and settings.turn_deg_per_s != 0
-        lens, light = view.camera.fov_vertical_deg, view.light.strength
-        key = (view.pose[:3, :3].tobytes(), lens, light, view.time if moving else 0.0)
-        if self._sky is None or self._sky[0] != key:
-            self._sky = (key, self._draw_background(view))
-        return self._sky[1]
+        fov, light = view.camera.fov_vertical_deg, view.light.strength
+        key = (view.pose[:3, :3].tobytes(), fov, light, view.time if moving else 0.0)
+        if self._cached_background is None or self._cached_background[0] != key:
+            self._cached_background = (key, self._draw_background(view))
+        return self._cached_background[1]
 
     def _draw_background(self, view: CameraView) -> Floats:
         settings, rotation = self.scenario.background, view.pose[:3, :3]
         width, height = view.camera.size
         if isinstance(settings, Panorama):
-            drawn = sky.panorama(self._looking(view), settings) * np.float32(view.light.strength)
+            drawn = backgrounds.panorama(self._view_directions(view), settings) * np.float32(
+                view.light.strength
+            )
             return np.asarray(drawn.reshape(height, width, 3))
-        drawn = sky.stars(view.camera, rotation, settings)
+        drawn = backgrounds.stars(view.camera, rotation, settings)
         if isinstance(settings, Earth):
-            turn = sky.ground_turn(settings, view.time)
-            light, met = sky.earth(self._looking(view), turn, settings, view.light)
-            drawn.reshape(-1, 3)[met] = light[met] * np.float32(view.light.strength)
+            rotation_of_ground = backgrounds.ground_rotation(settings, view.time)
+            light, hit = backgrounds.earth(
+                self._view_directions(view), rotation_of_ground, settings, view.light
+            )
+            drawn.reshape(-1, 3)[hit] = light[hit] * np.float32(view.light.strength)
         return drawn
 
-    def _looking(self, view: CameraView) -> Floats:
+    def _view_directions(self, view: CameraView) -> Floats:
         """(H * W, 3) unit directions through the pixels, world."""
         rays = view.rays @ view.pose[:3, :3].T.astype(np.float32)
         return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
 
     def _shade(
-        self, caster: RayCaster, hits: Hits, rays: Floats, behind: Floats, view: CameraView
+        self, caster: RayCaster, hits: Hits, rays: Floats, background: Floats, view: CameraView
     ) -> Floats:
         """(N, 3) radiance along rays from the pinhole, BGR."""
-        radiance = behind.copy()
-        met = hits.body >= 0
-        face, rays = hits.face[met], rays[met]
-        points = rays * hits.distance[met][:, None]
+        radiance = background.copy()
+        hit = hits.body >= 0
+        face, rays = hits.face[hit], rays[hit]
+        points = rays * hits.distance[hit][:, None]
         normals = caster.normals[face]
         # Thin shells are two-sided: normals always face the camera.
         normals = np.where(np.sum(normals * rays, axis=1, keepdims=True) > 0, -normals, normals)
         light = view.light
         sun, earth = (_to_camera(view.pose, d) for d in (light.sun, light.earth))
         facing = np.clip(normals @ sun, 0.0, None)
-        towards = np.flatnonzero(facing > 0)
-        facing[towards[caster.blocked(points[towards], normals[towards], sun)]] = 0.0
+        lit = np.flatnonzero(facing > 0)
+        facing[lit[caster.occluded(points[lit], normals[lit], sun)]] = 0.0
         # The Earth fills half the sky: its light falls off gently with the angle to it.
         glow = light.earthshine * np.maximum(0.5 + 0.5 * (normals @ earth), 0.0)
         strength = np.float32(light.strength) * (facing + glow)
-        albedo = caster.albedo[face] * self._grain(caster, hits.body[met], points)[:, None]
-        radiance[met] = albedo[:, ::-1] * strength[:, None]
+        albedo = caster.albedo[face] * self._texture_factor(caster, hits.body[hit], points)[:, None]
+        radiance[hit] = albedo[:, ::-1] * strength[:, None]
         return radiance
 
-    def _grain(self, caster: RayCaster, body: NDArray[np.int32], points: Floats) -> Floats:
+    def _texture_factor(self, caster: RayCaster, body: NDArray[np.int32], points: Floats) -> Floats:
         """(N,) factors of reflectance at points on bodies, from their textures."""
         factor = np.ones(len(points), np.float32)
         for number, placed in enumerate(caster.bodies):
             texture = self.scene.objects[placed.name].texture
-            mine = body == number
-            if texture is not None and mine.any():
-                back = inverse(placed.pose)
-                own = points[mine] @ back[:3, :3].T + back[:3, 3]
-                grain = pattern(own / texture.size, texture.seed)
-                factor[mine] = np.maximum(1 + texture.contrast * grain, 0)
+            on_body = body == number
+            if texture is not None and on_body.any():
+                from_camera = inverse(placed.pose)
+                local = points[on_body] @ from_camera[:3, :3].T + from_camera[:3, 3]
+                grain = pattern(local / texture.size, texture.seed)
+                factor[on_body] = np.maximum(1 + texture.contrast * grain, 0)
         return factor
 
-    def _smooth_edges(
-        self, radiance: Floats, caster: RayCaster, hits: Hits, behind: Floats, view: CameraView
+    def _antialias_edges(
+        self, radiance: Floats, caster: RayCaster, hits: Hits, background: Floats, view: CameraView
     ) -> None:
         """Replace pixels on edges by the mean over a grid of rays within them."""
         width, height = view.camera.size
@@ -244,12 +248,12 @@ class Renderer:
         )
         if len(edge) == 0:
             return
-        steps = (np.arange(SUBRAYS) + 0.5) / SUBRAYS - 0.5
+        steps = (np.arange(EDGE_SAMPLES) + 0.5) / EDGE_SAMPLES - 0.5
         grid = np.array([(x, y) for y in steps for x in steps])
         centres = np.column_stack([edge % width, edge // width]).astype(float)
         points = (centres[:, None] + grid).reshape(-1, 2)
         rays = pixel_rays(view.camera, points)
-        hidden = np.repeat(behind[edge], len(grid), axis=0)
+        hidden = np.repeat(background[edge], len(grid), axis=0)
         fine = self._shade(caster, caster.from_pinhole(rays), rays, hidden, view)
         radiance[edge] = fine.reshape(len(edge), len(grid), 3).mean(axis=1)
 
@@ -259,7 +263,7 @@ def _to_camera(camera: Matrix, direction: tuple[float, float, float]) -> Floats:
     return np.asarray(d / np.linalg.norm(d), np.float32)
 
 
-def _spread(hits: Hits, inside: NDArray[np.bool_]) -> Hits:
+def _scatter(hits: Hits, inside: NDArray[np.bool_]) -> Hits:
     """Hits of some rays, scattered into the array of all."""
     body = np.full(len(inside), -1, np.int32)
     face = np.full(len(inside), -1, np.int32)

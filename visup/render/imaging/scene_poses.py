@@ -15,12 +15,12 @@ from visup.render.meshes.spacecraft import mesh
 from visup.render.scenario.scenario import PoseKey, Scenario, SceneObject
 from visup.render.scenario.trajectories import (
     Matrix,
+    camera_shake,
     inverse,
     look_at,
     pose_of,
+    rotation_about,
     rotation_at,
-    shake,
-    spin_about,
     value_at,
 )
 
@@ -46,34 +46,36 @@ class PosedScene:
         keys = settings.track
         times = np.array([k.at_s for k in keys])
         columns = np.array([[*k.position, *k.look_at, *k.up] for k in keys])
-        at = value_at(times, columns, time, settings.smooth)
-        rotation = look_at(at[:3], at[3:6], at[6:])
+        values = value_at(times, columns, time, settings.smooth)
+        rotation = look_at(values[:3], values[3:6], values[6:])
         if settings.shake is not None:
             s = settings.shake
-            rotation = rotation * shake(time, s.amplitude_deg, s.frequency_hz, s.seed)
-        return pose_of(at[:3], rotation)
+            rotation = rotation * camera_shake(time, s.amplitude_deg, s.frequency_hz, s.seed)
+        return pose_of(values[:3], rotation)
 
     def bodies(self, time: float, camera: Matrix) -> list[Body]:
         """All objects, in the camera's frame."""
         to_camera = inverse(camera)
-        placed = []
+        posed = []
         for item in self.scenario.object:
             solid = self.solids.get(item.name) or self._arm_solid(item, time)
-            placed.append(
+            posed.append(
                 Body(item.name, item.label, solid, to_camera @ self.object_pose(item, time))
             )
-        return placed
+        return posed
 
     def object_pose(self, item: SceneObject, time: float) -> Matrix:
         """(4, 4) from an object's frame to the world's; for an arm, that of its foot."""
         if item.attach is not None and time > item.attach.from_s:
             carrier, since = self.objects[item.attach.to], item.attach.from_s
-            carried = inverse(self.grip(carrier, since)) @ self.object_pose(item, since)
-            return np.asarray(self.grip(carrier, time) @ carried)
+            relative = inverse(self.attachment_frame(carrier, since)) @ self.object_pose(
+                item, since
+            )
+            return np.asarray(self.attachment_frame(carrier, time) @ relative)
         return track_pose(item, time)
 
-    def grip(self, item: SceneObject, time: float) -> Matrix:
-        """The frame in which things attached to an object are at rest."""
+    def attachment_frame(self, item: SceneObject, time: float) -> Matrix:
+        """The frame in which attached objects are at rest."""
         pose = self.object_pose(item, time)
         return pose @ arm_model.tip_pose(self._joints(item, time)) if item.mesh == "arm" else pose
 
@@ -84,12 +86,12 @@ class PosedScene:
             return arm_model.Joints(*value_at(times, angles, time, item.smooth))
         times = np.array([k.at_s for k in item.tip])
         columns = np.array([[*k.position, *k.direction] for k in item.tip])
-        at = value_at(times, columns, time, item.smooth)
-        foot = inverse(track_pose(item, time))
-        tip = foot[:3, :3] @ at[:3] + foot[:3, 3]
+        values = value_at(times, columns, time, item.smooth)
+        from_world = inverse(track_pose(item, time))
+        tip = from_world[:3, :3] @ values[:3] + from_world[:3, 3]
         try:
-            return arm_model.reach(
-                tip, foot[:3, :3] @ at[3:], radians(item.roll_deg), item.elbow_up
+            return arm_model.inverse_kinematics(
+                tip, from_world[:3, :3] @ values[3:], radians(item.roll_deg), item.elbow_up
             )
         except SettingsError as error:
             raise SettingsError(
@@ -107,8 +109,8 @@ def track_pose(item: SceneObject, time: float) -> Matrix:
     position = value_at(times, np.array([k.position for k in keys]), time, item.smooth)
     rotation = rotation_at(times, Rotation.concatenate([_orientation(k) for k in keys]), time)
     for spin in item.spin:
-        turned = spin.deg_per_s * max(0.0, time - spin.from_s)
-        rotation = spin_about(np.asarray(spin.axis, float), turned) * rotation
+        angle_deg = spin.deg_per_s * max(0.0, time - spin.from_s)
+        rotation = rotation_about(np.asarray(spin.axis, float), angle_deg) * rotation
     return pose_of(position, rotation)
 
 

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 Floats = NDArray[np.float32]
-SIDE = 32
+LATTICE_SIDE = 32
 """Values along each side of the lattice, after which the pattern repeats."""
 
 OCTAVES = 4
-STEEP = 2.2
+CONTRAST_GAIN = 2.2
 """Contrast factor: sums of noise concentrate around zero."""
 
 
@@ -29,21 +29,21 @@ def pattern(points: NDArray[np.floating], seed: int) -> Floats:
     """
     lattice = _lattice(seed)
     total = np.zeros(len(points), np.float32)
-    at = np.asarray(points, np.float32)
-    weight, most = 1.0, 0.0
+    position = np.asarray(points, np.float32)
+    weight, total_weight = 1.0, 0.0
     for _ in range(OCTAVES):
-        cell = np.floor(at)
-        step = at - cell
+        cell = np.floor(position)
+        fraction = position - cell
         # Smoothstep within each cell hides the lattice.
-        eased = cell + step * step * (3 - 2 * step)
+        eased = cell + fraction * fraction * (3 - 2 * fraction)
         total += np.float32(weight) * map_coordinates(lattice, eased.T, order=1, mode="grid-wrap")
-        most += weight
+        total_weight += weight
         # Shifted as well, so that the corners of the lattices do not coincide.
-        weight, at = 0.6 * weight, 2 * at + np.float32(7.3)
-    return np.asarray(np.clip(STEEP * total / most, -1, 1), np.float32)
+        weight, position = 0.6 * weight, 2 * position + np.float32(7.3)
+    return np.asarray(np.clip(CONTRAST_GAIN * total / total_weight, -1, 1), np.float32)
 
 
 @lru_cache(maxsize=16)
 def _lattice(seed: int) -> Floats:
-    values = np.random.default_rng(seed).uniform(-1, 1, (SIDE, SIDE, SIDE))
+    values = np.random.default_rng(seed).uniform(-1, 1, (LATTICE_SIDE, LATTICE_SIDE, LATTICE_SIDE))
     return values.astype(np.float32)

@@ -76,7 +76,7 @@ def tip_pose(joints: Joints) -> NDArray[np.float64]:
     return link_poses(joints)[-1]
 
 
-def reach(
+def inverse_kinematics(
     tip: NDArray[np.float64],
     direction: NDArray[np.float64],
     roll: float = 0.0,
@@ -102,20 +102,20 @@ def reach(
     d = np.asarray(direction, float) / np.linalg.norm(direction)
     wrist_yaw_at = np.asarray(tip, float) - (HAND + TOOL) * d
     yaw = atan2(wrist_yaw_at[1], wrist_yaw_at[0])
-    out, side = np.array([cos(yaw), sin(yaw), 0.0]), np.array([-sin(yaw), cos(yaw), 0.0])
-    in_plane = np.array([float(d @ out), float(d[2])])
-    size = float(np.linalg.norm(in_plane))
-    if size < 1e-9:
+    radial, tangential = np.array([cos(yaw), sin(yaw), 0.0]), np.array([-sin(yaw), cos(yaw), 0.0])
+    in_plane = np.array([float(d @ radial), float(d[2])])
+    in_plane_length = float(np.linalg.norm(in_plane))
+    if in_plane_length < 1e-9:
         raise SettingsError("the arm cannot point straight across its own plane")
-    along = in_plane / size
-    planar = np.array([float(wrist_yaw_at @ out), wrist_yaw_at[2] - FOOT]) - WRIST * along
+    along = in_plane / in_plane_length
+    planar = np.array([float(wrist_yaw_at @ radial), wrist_yaw_at[2] - FOOT]) - WRIST * along
     shoulder, elbow = _two_links(planar, elbow_up)
     return Joints(
         yaw,
         shoulder,
         elbow,
-        _wrap(atan2(along[1], along[0]) - shoulder - elbow),
-        atan2(float(d @ side), size),
+        _wrap_angle(atan2(along[1], along[0]) - shoulder - elbow),
+        atan2(float(d @ tangential), in_plane_length),
         roll,
     )
 
@@ -136,11 +136,11 @@ def _two_links(target: NDArray[np.float64], elbow_up: bool) -> tuple[float, floa
         )
     bend = acos((distance**2 - UPPER**2 - LOWER**2) / (2 * UPPER * LOWER))
     elbow = -bend if elbow_up else bend
-    lead = atan2(LOWER * sin(elbow), UPPER + LOWER * cos(elbow))
-    return atan2(target[1], target[0]) - lead, elbow
+    elbow_offset = atan2(LOWER * sin(elbow), UPPER + LOWER * cos(elbow))
+    return atan2(target[1], target[0]) - elbow_offset, elbow
 
 
-def _wrap(angle: float) -> float:
+def _wrap_angle(angle: float) -> float:
     return (angle + pi) % (2 * pi) - pi
 
 

@@ -34,7 +34,7 @@ DARK: Colour = (0.12, 0.12, 0.13)
 def guitar() -> Solid:
     """A guitar: two bouts with a waist, a neck and a head."""
     body = [
-        ((0.2 + 0.055 * cos(2 * a) + 0.02 * cos(a)) * sin(a), -0.30 * cos(a)) for a in _turn(48)
+        ((0.2 + 0.055 * cos(2 * a) + 0.02 * cos(a)) * sin(a), -0.30 * cos(a)) for a in _angles(48)
     ]
     waisted = [(x * (1 - 0.28 * _bump(z, 0.04, 0.10)), z) for x, z in body]
     return join(
@@ -247,17 +247,17 @@ def espresso() -> Solid:
     )
 
 
-def _turn(count: int) -> list[float]:
+def _angles(count: int) -> list[float]:
     return [2 * pi * k / count for k in range(count)]
 
 
 def _bump(at: float, middle: float, width: float) -> float:
     """1 at the middle, falling to 0 at a width from it."""
-    far = abs(at - middle) / width
-    return 0.0 if far >= 1 else 0.5 + 0.5 * cos(pi * far)
+    distance = abs(at - middle) / width
+    return 0.0 if distance >= 1 else 0.5 + 0.5 * cos(pi * distance)
 
 
-THINGS: dict[str, Callable[[], Solid]] = {
+DISTRACTORS: dict[str, Callable[[], Solid]] = {
     **ANIMALS,
     "guitar": guitar,
     "umbrella": umbrella,

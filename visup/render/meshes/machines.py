@@ -22,7 +22,7 @@ from visup.render.meshes.solids import (
     rod,
 )
 
-Place = tuple[float, float, float]
+Point = tuple[float, float, float]
 
 
 def excavator() -> Solid:
@@ -198,13 +198,13 @@ def turbine() -> Solid:
     return join(cone((0, 0, 0), (0, 0, 3.0), 0.16, 0.08), nacelle, rotor)
 
 
-def _wheel(middle: Place, radius: float, width: float) -> Solid:
+def _wheel(middle: Point, radius: float, width: float) -> Solid:
     """A wheel whose axle lies along y."""
     x, y, z = middle
     return cone((x, y - width / 2, z), (x, y + width / 2, z), radius)
 
 
-def _spoked(middle: Place, radius: float = 0.33) -> Solid:
+def _spoked(middle: Point, radius: float = 0.33) -> Solid:
     """A thin wheel with spokes in the plane of x and z."""
     x, y, z = middle
     rim = [(x + radius * cos(k * pi / 12), y, z + radius * sin(k * pi / 12)) for k in range(25)]

@@ -103,17 +103,19 @@ def from_trimesh(mesh: trimesh.Trimesh, colour: Colour = GREY) -> Solid:
     return bare.painted(colour)
 
 
-def box(size: ArrayLike, at: ArrayLike = (0.0, 0.0, 0.0), colour: Colour = GREY) -> Solid:
+def box(size: ArrayLike, centre: ArrayLike = (0.0, 0.0, 0.0), colour: Colour = GREY) -> Solid:
     """A box of (x, y, z) extents, centred at a point."""
-    return from_trimesh(trimesh.creation.box(extents=np.asarray(size, float)), colour).moved(by=at)
+    return from_trimesh(trimesh.creation.box(extents=np.asarray(size, float)), colour).moved(
+        by=centre
+    )
 
 
 def ball(
-    radii: ArrayLike, at: ArrayLike = (0.0, 0.0, 0.0), colour: Colour = GREY, detail: int = 3
+    radii: ArrayLike, centre: ArrayLike = (0.0, 0.0, 0.0), colour: Colour = GREY, detail: int = 3
 ) -> Solid:
     """An ellipsoid; one radius, or one for each axis. Each step of detail has four times the faces."""
     mesh = trimesh.creation.icosphere(subdivisions=detail)
-    return from_trimesh(mesh, colour).moved(by=at, scale=radii)
+    return from_trimesh(mesh, colour).moved(by=centre, scale=radii)
 
 
 def lathe(
@@ -171,7 +173,7 @@ def cone(
     a, b = np.asarray(start, float), np.asarray(end, float)
     length = float(np.linalg.norm(b - a))
     upright = lathe([(0, 0), (radius, 0), (top, length), (0, length)], colour)
-    return upright.transformed(_standing(a, b))
+    return upright.transformed(_align_z(a, b))
 
 
 def rod(
@@ -227,7 +229,7 @@ def plate(outline: Sequence[tuple[float, float]], thickness: float, colour: Colo
     return Solid(vertices, faces, np.tile(np.asarray(colour, float), (len(faces), 1)))
 
 
-def _standing(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+def _align_z(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
     """The rigid motion that takes the z axis to the line from a to b."""
     z = (b - a) / np.linalg.norm(b - a)
     other = np.array([1.0, 0, 0]) if abs(z[0]) < 0.9 else np.array([0, 1.0, 0])

@@ -10,7 +10,7 @@ from functools import cache
 from pathlib import Path
 
 from visup.agent.model.errors import SettingsError
-from visup.render.meshes import distractors as things
+from visup.render.meshes.distractors import DISTRACTORS
 from visup.render.meshes.machines import MACHINES
 from visup.render.meshes.solids import GREY, Colour, Solid, ball, box, cone, from_trimesh, join
 
@@ -93,7 +93,7 @@ MESHES: dict[str, Callable[[], Solid]] = {
     "payload_bay": payload_bay,
     "sill": sill,
     "slab": slab,
-    **things.THINGS,
+    **DISTRACTORS,
     **MACHINES,
 }
 """Every mesh built in code that stands still in itself; the arm is in `arm.py`."""

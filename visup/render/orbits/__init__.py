@@ -1,4 +1,4 @@
 """Random missions in orbit: an arm, a satellite, sometimes an unexpected object, and an outcome.
 
-Read `courses` (the events), then `scenes` (camera and light), then `random_orbit` (draws a mission).
+Read `capture_scripts` (the events), `unexpected_objects`, then `random_orbit` (draws a mission).
 """

@@ -32,9 +32,9 @@ def write_demo_clip(folder: Path, progress: Callable[[int, int], None] | None = 
     frames = []
     with ClipWriter(folder / CLIP, scenario.camera.fps, scenario.camera.size) as video:
         for index in range(scenario.frame_count):
-            picture = renderer.picture(index)
-            video.write(picture.image)
-            frames.append(frame_truth(picture, labels))
+            frame = renderer.render(index)
+            video.write(frame.image)
+            frames.append(frame_truth(frame, labels))
             if progress is not None:
                 progress(index + 1, scenario.frame_count)
     record = {"mission": mission(scenario), "truth": mission_truth(renderer, frames)}

@@ -22,26 +22,26 @@ from visup.percepts.shape.building.mesh_views import half_sphere_directions
 from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.percepts.shape.index.view_records import NewView
 from visup.render.imaging.renderer import Renderer
-from visup.render.meshes.distractors import THINGS
+from visup.render.meshes.distractors import DISTRACTORS
 from visup.render.meshes.spacecraft import mesh
 from visup.render.scenario.library import shipped_scenario
 
 MODELS = "demo.models"
 """Name of the shipped file, in ``visup/data``."""
 
-TOTAL = 633
+TOTAL_VIEWS = 633
 ARM_VIEWS = 4
 SPARTAN_VIEWS = 22
-EVERY = 10
+FRAME_STEP = 10
 """Frames of the clip between silhouettes of the arm that are clustered."""
 
 
 def view_counts() -> dict[str, int]:
     """How many views each of the 20 models has: 633 in all."""
-    others = ["payload_bay", *sorted(THINGS)]
-    left = TOTAL - ARM_VIEWS - SPARTAN_VIEWS
-    each, more = divmod(left, len(others))
-    counts = {name: each + (number < more) for number, name in enumerate(others)}
+    others = ["payload_bay", *sorted(DISTRACTORS)]
+    remaining = TOTAL_VIEWS - ARM_VIEWS - SPARTAN_VIEWS
+    base_count, extra = divmod(remaining, len(others))
+    counts = {name: base_count + (number < extra) for number, name in enumerate(others)}
     return {"spartan": SPARTAN_VIEWS, "arm": ARM_VIEWS, **counts}
 
 
@@ -56,12 +56,12 @@ def rendered_views(name: str, count: int) -> list[NewView]:
         return mesh_file_views(path, half_sphere_directions(count))
 
 
-def arm_masks(every: int = EVERY) -> list[NDArray[np.bool_]]:
+def arm_masks(step: int = FRAME_STEP) -> list[NDArray[np.bool_]]:
     """Silhouettes of the arm in the demo's clip, (H, W) bool each, cut by the border of the image."""
     scenario = shipped_scenario("sts87")
     label = next(o.label for o in scenario.object if o.name == "arm")
     renderer = Renderer(scenario)
-    return [renderer.mask(k) == label for k in range(0, scenario.frame_count, every)]
+    return [renderer.mask(k) == label for k in range(0, scenario.frame_count, step)]
 
 
 def demo_views() -> Iterator[list[NewView]]:
@@ -89,12 +89,12 @@ def build_demo_database(
         DatabaseError: The file cannot be written.
     """
     names = list(view_counts())
-    done: list[NewView] = []
+    database_views: list[NewView] = []
     for number, views in enumerate(demo_views()):
-        done.extend(views)
+        database_views.extend(views)
         if progress is not None:
             progress(number + 1, len(names), names[number])
-    return ModelDatabase.create(path, done)
+    return ModelDatabase.create(path, database_views)
 
 
 if __name__ == "__main__":

@@ -12,19 +12,19 @@ from visup.render.imaging.renderer import RenderedFrame, Renderer
 from visup.render.scenario.scenario import Scenario
 from visup.render.scenario.trajectories import Matrix
 
-ENTERED = 0.10
+MIN_ENTERED_SHARE = 0.10
 """An object is in the image while its amodal area is at least this share of its maximum."""
 
-HIDDEN, SHOWN = 0.20, 0.50
+OCCLUDED_BELOW, VISIBLE_ABOVE = 0.20, 0.50
 """An object is occluded when less than the first share of it is visible, and visible again above the
 second."""
 
 
-def frame_truth(picture: RenderedFrame, labels: Mapping[str, int]) -> dict[str, Any]:
+def frame_truth(frame: RenderedFrame, labels: Mapping[str, int]) -> dict[str, Any]:
     """Ground truth of one frame.
 
     Args:
-        picture: The frame.
+        frame: The frame.
         labels: Object -> mask value.
 
     Returns:
@@ -33,20 +33,20 @@ def frame_truth(picture: RenderedFrame, labels: Mapping[str, int]) -> dict[str, 
         ``quat_xyzw`` from the object's frame to the camera's (x right, y down, z forward); the last
         two not for arms, which have no pose of their own.
     """
-    out: dict[str, Any] = {"index": picture.index}
+    out: dict[str, Any] = {"index": frame.index}
     for name, label in labels.items():
-        shown = picture.mask == label
+        visible = frame.mask == label
         record: dict[str, Any] = {
-            "visible_px": int(np.count_nonzero(shown)),
-            "amodal_px": picture.amodal_px[name],
+            "visible_px": int(np.count_nonzero(visible)),
+            "amodal_px": frame.amodal_px[name],
         }
         if record["visible_px"]:
-            ys, xs = np.flatnonzero(shown.any(axis=1)), np.flatnonzero(shown.any(axis=0))
+            ys, xs = np.flatnonzero(visible.any(axis=1)), np.flatnonzero(visible.any(axis=0))
             record["bbox"] = [
                 int(v) for v in (xs[0], ys[0], xs[-1] - xs[0] + 1, ys[-1] - ys[0] + 1)
             ]
-        if name in picture.poses:
-            record |= _pose(picture.poses[name])
+        if name in frame.poses:
+            record |= _pose(frame.poses[name])
         out[name] = record
     return out
 
@@ -69,18 +69,18 @@ def presence_events(name: str, frames: Sequence[Mapping[str, Any]]) -> list[dict
     Returns:
         Records of ``kind``, ``object``, ``frame``.
     """
-    most = max(f[name]["amodal_px"] for f in frames)
+    max_area = max(f[name]["amodal_px"] for f in frames)
     events: list[dict[str, Any]] = []
     inside = hidden = False
     for frame in frames:
-        whole, visible = frame[name]["amodal_px"], frame[name]["visible_px"]
-        now_inside = whole > 0 and whole >= ENTERED * most
+        area, visible = frame[name]["amodal_px"], frame[name]["visible_px"]
+        now_inside = area > 0 and area >= MIN_ENTERED_SHARE * max_area
         if now_inside != inside:
             inside, hidden = now_inside, False
             events.append(
                 {"kind": "entry" if inside else "exit", "object": name, "frame": frame["index"]}
             )
-        now_hidden = inside and visible < (SHOWN if hidden else HIDDEN) * whole
+        now_hidden = inside and visible < (VISIBLE_ABOVE if hidden else OCCLUDED_BELOW) * area
         if now_hidden != hidden:
             hidden = now_hidden
             kind = "occlusion" if hidden else "reappearance"

@@ -47,10 +47,10 @@ def write_mission(
     frames = []
     with ClipWriter(out / f"video{container}", scenario.camera.fps, scenario.camera.size) as video:
         for index in range(scenario.frame_count):
-            picture = renderer.picture(index)
-            video.write(picture.image)
-            write_mask(out, index, picture.mask)
-            frames.append(frame_truth(picture, labels))
+            frame = renderer.render(index)
+            video.write(frame.image)
+            write_mask(out, index, frame.mask)
+            frames.append(frame_truth(frame, labels))
             if progress is not None:
                 progress(index + 1, scenario.frame_count)
     truth = mission_truth(renderer, frames)

@@ -48,14 +48,14 @@ def shipped_scenario(name: str) -> Scenario:
     return parse_scenario(text, f"{name}.toml")
 
 
-def find_scenario(word: str) -> Scenario:
+def find_scenario(name_or_path: str) -> Scenario:
     """A scenario by the path of its file, or by the name of a shipped one.
 
     Raises:
         SettingsError: There is none, or the file is invalid.
         ErrorGroup: The file has several errors.
     """
-    path = Path(word)
+    path = Path(name_or_path)
     if path.is_file() or path.suffix == ".toml":
         return load_scenario(path)
-    return shipped_scenario(word)
+    return shipped_scenario(name_or_path)

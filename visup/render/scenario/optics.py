@@ -31,7 +31,7 @@ class ScenarioModel(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-def rising(keys: tuple[Any, ...]) -> tuple[Any, ...]:
+def check_increasing(keys: tuple[Any, ...]) -> tuple[Any, ...]:
     """Keyframes whose times rise."""
     times = [k.at_s for k in keys]
     if any(b <= a for a, b in pairwise(times)):
@@ -48,9 +48,9 @@ class CameraKey(ScenarioModel):
     up: Direction = (0.0, 0.0, 1.0)
 
     @model_validator(mode="after")
-    def _sees(self) -> CameraKey:
-        sight = np.subtract(self.look_at, self.position)
-        if np.linalg.norm(np.cross(sight, self.up)) < 1e-9:
+    def _has_line_of_sight(self) -> CameraKey:
+        line_of_sight = np.subtract(self.look_at, self.position)
+        if np.linalg.norm(np.cross(line_of_sight, self.up)) < 1e-9:
             raise ValueError(
                 "look_at must differ from position, and up must not lie along the line of sight"
             )
@@ -100,14 +100,14 @@ class Camera(ScenarioModel):
     )
     fps: Annotated[float, Field(gt=0, le=1000)] = 25.0
     fov_vertical_deg: FieldOfView = 38.0
-    track: Annotated[tuple[CameraKey, ...], Field(min_length=1), AfterValidator(rising)]
+    track: Annotated[tuple[CameraKey, ...], Field(min_length=1), AfterValidator(check_increasing)]
     shake: Shake | None = None
     smooth: bool = False
-    zoom: Annotated[tuple[ZoomKey, ...], AfterValidator(rising)] = ()
+    zoom: Annotated[tuple[ZoomKey, ...], AfterValidator(check_increasing)] = ()
 
     def at(self, time: float) -> Camera:
         """The camera with its zoom at a time."""
-        return _at(self, self.zoom, "fov_vertical_deg", time)
+        return _interpolated(self, self.zoom, "fov_vertical_deg", time)
 
     @property
     def focal_px(self) -> float:
@@ -122,11 +122,11 @@ class Light(ScenarioModel):
     earth: Direction = (0.0, 0.0, -1.0)
     earthshine: Annotated[float, Field(ge=0, le=1)] = 0.05
     strength: Share = 1.0
-    track: Annotated[tuple[LightKey, ...], AfterValidator(rising)] = ()
+    track: Annotated[tuple[LightKey, ...], AfterValidator(check_increasing)] = ()
 
     def at(self, time: float) -> Light:
         """The light with its strength at a time."""
-        return _at(self, self.track, "strength", time)
+        return _interpolated(self, self.track, "strength", time)
 
 
 class Stars(ScenarioModel):
@@ -172,7 +172,7 @@ class Sensor(ScenarioModel):
     """The response of the camera to light."""
 
     exposure: Exposure = 1.0
-    track: Annotated[tuple[ExposureKey, ...], AfterValidator(rising)] = ()
+    track: Annotated[tuple[ExposureKey, ...], AfterValidator(check_increasing)] = ()
     gamma: Annotated[float, Field(ge=1, le=3)] = 2.2
     black: Annotated[float, Field(ge=0, le=100)] = 4.0
     noise: Annotated[float, Field(ge=0, le=64)] = 1.5
@@ -180,13 +180,13 @@ class Sensor(ScenarioModel):
 
     def at(self, time: float) -> Sensor:
         """The sensor with its exposure at a time."""
-        return _at(self, self.track, "exposure", time)
+        return _interpolated(self, self.track, "exposure", time)
 
 
 Settings = TypeVar("Settings", Camera, Light, Sensor)
 
 
-def _at(settings: Settings, keys: tuple[Any, ...], name: str, time: float) -> Settings:
+def _interpolated(settings: Settings, keys: tuple[Any, ...], name: str, time: float) -> Settings:
     """The settings with one number interpolated linearly between its keyframes, constant outside them."""
     if not keys:
         return settings

@@ -25,7 +25,7 @@ from visup.render.scenario.optics import (
     Stars,
     Texture,
     Vector,
-    rising,
+    check_increasing,
 )
 
 
@@ -69,7 +69,7 @@ class SteadyRotation(ScenarioModel):
     from_s: Seconds = 0.0
 
 
-Keys = Annotated[tuple[PoseKey, ...], Field(min_length=1), AfterValidator(rising)]
+Keys = Annotated[tuple[PoseKey, ...], Field(min_length=1), AfterValidator(check_increasing)]
 
 
 class Attachment(ScenarioModel):
@@ -97,8 +97,8 @@ class SceneObject(ScenarioModel):
     track: Keys
     spin: tuple[SteadyRotation, ...] = ()
     attach: Attachment | None = None
-    tip: Annotated[tuple[TipKey, ...], AfterValidator(rising)] = ()
-    joints: Annotated[tuple[JointKey, ...], AfterValidator(rising)] = ()
+    tip: Annotated[tuple[TipKey, ...], AfterValidator(check_increasing)] = ()
+    joints: Annotated[tuple[JointKey, ...], AfterValidator(check_increasing)] = ()
     roll_deg: float = 0.0
     elbow_up: bool = True
 
@@ -106,10 +106,10 @@ class SceneObject(ScenarioModel):
     def _consistent(self) -> SceneObject:
         if self.label == 128:
             raise ValueError("label 128 means 'not scored' in masks; choose another")
-        led = bool(self.tip) + bool(self.joints)
-        if self.mesh == "arm" and led != 1:
+        drivers = bool(self.tip) + bool(self.joints)
+        if self.mesh == "arm" and drivers != 1:
             raise ValueError("an arm needs either tip or joints keys")
-        if self.mesh != "arm" and led:
+        if self.mesh != "arm" and drivers:
             raise ValueError("only the mesh 'arm' has tip or joints keys")
         if self.mesh == "arm" and self.texture:
             raise ValueError("an arm bends, and a texture is that of a rigid body")
@@ -180,25 +180,25 @@ class Scenario(ScenarioModel):
         return self.model_copy(update={"camera": self.camera.model_copy(update={"size": size})})
 
     @model_validator(mode="after")
-    def _names(self) -> Scenario:
+    def _check_names(self) -> Scenario:
         names = [o.name for o in self.object]
         labels = [str(o.label) for o in self.labelled]
-        for kind, words in (("name", names), ("label", labels)):
-            twice = sorted({w for w in words if words.count(w) > 1})
-            if twice:
-                raise ValueError(f"two objects have the {kind} {twice[0]!r}")
+        for kind, values in (("name", names), ("label", labels)):
+            duplicates = sorted({w for w in values if values.count(w) > 1})
+            if duplicates:
+                raise ValueError(f"two objects have the {kind} {duplicates[0]!r}")
         known = set(names)
-        wanted = [o.attach.to for o in self.object if o.attach]
-        wanted += [n for c in self.truth.coupling for n in c.objects]
-        wanted += [n for a in self.truth.alert for n in a.objects]
-        wanted += [self.truth.spin_of] if self.truth.spin_of else []
-        for name in wanted:
+        references = [o.attach.to for o in self.object if o.attach]
+        references += [n for c in self.truth.coupling for n in c.objects]
+        references += [n for a in self.truth.alert for n in a.objects]
+        references += [self.truth.spin_of] if self.truth.spin_of else []
+        for name in references:
             if name not in known:
                 raise ValueError(f"there is no object {name!r}; there are {', '.join(names)}")
-        self._no_ring_of_attachments()
+        self._check_attachment_cycles()
         return self
 
-    def _no_ring_of_attachments(self) -> None:
+    def _check_attachment_cycles(self) -> None:
         to = {o.name: o.attach.to for o in self.object if o.attach}
         for start in to:
             at, seen = start, {start}
@@ -259,20 +259,18 @@ def _with_mesh_paths(scenario: Scenario, folder: Path) -> Scenario:
 def _root_faults(error: ValidationError) -> list[dict[str, Any]]:
     """The root errors, without consequential ones: a list is 'too short' once its items are rejected."""
     found: list[dict[str, Any]] = [dict(e) for e in error.errors()]
-    places = [e["loc"] for e in found]
+    paths = [e["loc"] for e in found]
     return [
-        e
-        for e in found
-        if not any(p != e["loc"] and p[: len(e["loc"])] == e["loc"] for p in places)
+        e for e in found if not any(p != e["loc"] and p[: len(e["loc"])] == e["loc"] for p in paths)
     ]
 
 
 def _fault(error: dict[str, Any], name: str, text: str) -> SettingsError:
     """A pydantic error in the user's terms."""
-    steps = [
+    path = [
         s for s in error["loc"] if s not in ("stars", "earth", "panorama") or len(error["loc"]) == 1
     ]
-    where = ".".join(str(s + 1) if isinstance(s, int) else str(s) for s in steps)
+    where = ".".join(str(s + 1) if isinstance(s, int) else str(s) for s in path)
     message = str(error["msg"]).removeprefix("Value error, ").rstrip(".")
     if error["type"] == "extra_forbidden":
         message = "there is no such setting"
@@ -280,14 +278,14 @@ def _fault(error: dict[str, Any], name: str, text: str) -> SettingsError:
         message = "this setting is missing"
     return SettingsError(
         f"{where}: {message}" if where else message,
-        where=_place(name, text, steps) or name,
+        where=_key_location(name, text, path) or name,
         hint="docs/scenarios.md lists every setting",
     )
 
 
-def _place(name: str, text: str, steps: list[Any]) -> SourceLocation | None:
+def _key_location(name: str, text: str, path: list[Any]) -> SourceLocation | None:
     """The line of a key, if it occurs only once in the file."""
-    keys = [s for s in steps if isinstance(s, str)]
+    keys = [s for s in path if isinstance(s, str)]
     if not keys:
         return None
     key = keys[-1]

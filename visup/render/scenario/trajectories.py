@@ -76,12 +76,12 @@ def rotation_at(times: NDArray[np.float64], rotations: Rotation, t: float) -> Ro
     return Slerp(times, rotations)(float(np.clip(t, times[0], times[-1])))
 
 
-def spin_about(axis: NDArray[np.float64], degrees: float) -> Rotation:
+def rotation_about(axis: NDArray[np.float64], degrees: float) -> Rotation:
     """A rotation about an axis of any length."""
     return Rotation.from_rotvec(np.radians(degrees) * axis / np.linalg.norm(axis))
 
 
-def shake(t: float, amplitude_deg: float, frequency_hz: float, seed: int) -> Rotation:
+def camera_shake(t: float, amplitude_deg: float, frequency_hz: float, seed: int) -> Rotation:
     """A small camera rotation that varies without repeating.
 
     Args:

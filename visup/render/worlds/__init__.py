@@ -1,6 +1,6 @@
 """Random worlds: machines at work in scenes that are drawn from a seed, with masks, brief and truth.
 
-Read `world.py` (what a world is made of), `kinds/` (how one is scripted; `pick.py` first), `things/`
-(what it is furnished with), `plate.py` and `frames.py` (how it is drawn: what rests once, what moves in
-each frame), `truth.py`, `lesson.py` and `writer.py` (what is written of it).
+Read `world.py` (the data of a world), `kinds/` (the scripts; `pick.py` first), `assets/` (surroundings and
+machines), `plate.py` (the static scene, rendered once), `world_renderer.py` (moving bodies, rendered in each
+frame), `truth.py`, `teaching_clip.py` and `writer.py` (the files).
 """

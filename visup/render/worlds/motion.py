@@ -15,7 +15,7 @@ Doubles = NDArray[np.float64]
 GRAVITY = 9.81
 
 
-def clock(frames: int) -> Doubles:
+def frame_times(frames: int) -> Doubles:
     """(F,) times of the frames, seconds."""
     return np.arange(frames) / FPS
 
@@ -42,7 +42,7 @@ def eased(at: Doubles, keys: Sequence[tuple[float, Any]]) -> Doubles:
     return np.asarray(values[k] + soft * (values[k + 1] - values[k]))
 
 
-def cruised(at: Doubles, begin: float, end: float, ramp: float = 0.2) -> Doubles:
+def trapezoidal_profile(at: Doubles, begin: float, end: float, ramp: float = 0.2) -> Doubles:
     """(F,) shares of a path, 0 to 1: acceleration, constant speed, deceleration.
 
     `ramp` is the share of the time for each of acceleration and deceleration.
@@ -53,7 +53,7 @@ def cruised(at: Doubles, begin: float, end: float, ramp: float = 0.2) -> Doubles
     return np.where(u < ramp, up, np.where(u > 1 - ramp, down, speed * (u - ramp / 2)))
 
 
-def posed(
+def make_poses(
     positions: ArrayLike, yaw: ArrayLike = 0.0, pitch: ArrayLike = 0.0, roll: ArrayLike = 0.0
 ) -> Poses:
     """Poses from positions and angles.
@@ -77,12 +77,12 @@ def posed(
     return poses
 
 
-def still(x: float, y: float, z: float = 0.0, yaw: float = 0.0) -> Poses:
-    """(1, 4, 4): a thing that never moves."""
-    return posed([x, y, z], yaw)
+def static_pose(x: float, y: float, z: float = 0.0, yaw: float = 0.0) -> Poses:
+    """(1, 4, 4): a body that never moves."""
+    return make_poses([x, y, z], yaw)
 
 
-def along(points: Doubles, share: Doubles) -> tuple[Doubles, Doubles]:
+def path_positions(points: Doubles, share: Doubles) -> tuple[Doubles, Doubles]:
     """Positions and headings on a polyline.
 
     Args:
@@ -101,7 +101,9 @@ def along(points: Doubles, share: Doubles) -> tuple[Doubles, Doubles]:
     return at, np.interp(s, middle, heading)
 
 
-def bend(start: ArrayLike, through: ArrayLike, end: ArrayLike, count: int = 60) -> Doubles:
+def quadratic_bezier(
+    start: ArrayLike, through: ArrayLike, end: ArrayLike, count: int = 60
+) -> Doubles:
     """(count, D): a quadratic curve from a start to an end, drawn towards a point between."""
     a, b, c = (np.asarray(p, float) for p in (start, through, end))
     u = np.linspace(0, 1, count)[:, None]
@@ -136,7 +138,7 @@ def dropped(
     Args:
         poses: (F, 4, 4) without the fall.
         since: First frame of the fall.
-        floor: Final height of the thing's origin.
+        floor: Final height of the body's origin.
         tumble: Rotation during the fall, radians (world axes).
         scale: Factor on gravity, for scenes that are not in metres.
 

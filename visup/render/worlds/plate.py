@@ -1,7 +1,7 @@
 """The static scene, rendered once for the whole field that the camera covers.
 
 The camera only rotates about its pinhole and zooms, so each image of the static scene is this plate warped by
-a homography; only moving things are rendered in each frame.
+a homography; only moving bodies are rendered in each frame.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.render.worlds import viewpoint as vp
-from visup.render.worlds.shading import PlacedThings, ambient, direct, sky
+from visup.render.worlds.shading import PosedBodies, ambient, direct, sky_radiance
 from visup.render.worlds.world import Floats, World
 
-FAR = 1e4
+BACKGROUND_DISTANCE = 1e4
 """Distance assumed for the background, metres."""
 
 
@@ -26,16 +26,16 @@ class Plate:
     """The static scene, seen by the camera without shake; H and W are those of the plate.
 
     Attributes:
-        shade: (H, W, 3) radiance without the lamp, red, green, blue.
-        lamp: (H, W, 3) radiance that the lamp adds.
+        ambient: (H, W, 3) radiance without the sun, red, green, blue.
+        direct: (H, W, 3) radiance that the sun adds.
         points: (H, W, 3) end points of rays, world, metres.
         labels: (H, W) uint8.
         amodal: Label -> (H, W) uint8, 1 where it would be visible without occluders.
         water: (H, W) uint8, 1 on water.
     """
 
-    shade: Floats
-    lamp: Floats
+    ambient: Floats
+    direct: Floats
     points: Floats
     labels: NDArray[np.uint8]
     amodal: dict[int, NDArray[np.uint8]]
@@ -58,8 +58,8 @@ class Plate:
             return _warp(image, matrix, size, cv2.INTER_NEAREST)
 
         return Plate(
-            smooth(self.shade),
-            smooth(self.lamp),
+            smooth(self.ambient),
+            smooth(self.direct),
             sharp(self.points),
             sharp(self.labels),
             {label: sharp(seen) for label, seen in self.amodal.items()},
@@ -67,8 +67,8 @@ class Plate:
         )
 
 
-def _warp(image: Any, matrix: Any, size: tuple[int, int], how: int) -> Any:
-    flags = how | cv2.WARP_INVERSE_MAP
+def _warp(image: Any, matrix: Any, size: tuple[int, int], interpolation: int) -> Any:
+    flags = interpolation | cv2.WARP_INVERSE_MAP
     return cv2.warpPerspective(image, matrix, size, flags=flags, borderMode=cv2.BORDER_REPLICATE)
 
 
@@ -88,7 +88,7 @@ class PlateCamera:
         # The borders of the plate lie on the pixel grid of a camera on a tripod.
         self.origin = low
         extent = np.ceil((high - low) * self.focal - 1e-6).astype(int) + 1
-        self.fixed = not self.view.turns.any() and bool((self.view.zoom == 1).all())
+        self.fixed = not self.view.rotations_deg.any() and bool((self.view.zoom == 1).all())
         self.size = world.size if self.fixed else (int(extent[0]), int(extent[1]))
 
     def directions(self, shift: tuple[float, float] = (0.0, 0.0)) -> Floats:
@@ -97,106 +97,112 @@ class PlateCamera:
         flat = (
             np.column_stack([x.ravel() + shift[0], y.ravel() + shift[1]]) / self.focal + self.origin
         )
-        own = np.column_stack([flat, np.ones(len(flat))])
-        return np.asarray(own @ self.rotation.T, np.float32)
+        in_camera = np.column_stack([flat, np.ones(len(flat))])
+        return np.asarray(in_camera @ self.rotation.T, np.float32)
 
     def to_plate(self, index: int) -> NDArray[np.float64] | None:
         """(3, 3) from pixels of a frame to pixels of the plate; None if both are the same."""
         if self.fixed:
             return None
         focal = vp.focal_px(self.view, self.height, float(self.view.zoom[index]))
-        lens = np.array(
+        from_pixels = np.array(
             [
                 [1 / focal, 0, -(self.width - 1) / 2 / focal],
                 [0, 1 / focal, -(self.height - 1) / 2 / focal],
                 [0, 0, 1],
             ]
         )
-        place = np.array(
+        to_plate_pixels = np.array(
             [
                 [self.focal, 0, -self.origin[0] * self.focal],
                 [0, self.focal, -self.origin[1] * self.focal],
                 [0, 0, 1],
             ]
         )
-        return np.asarray(place @ vp.turn(self.view, index) @ lens)
+        return np.asarray(to_plate_pixels @ vp.frame_rotation(self.view, index) @ from_pixels)
 
     def _border(self, index: int) -> NDArray[np.float64]:
         """(N, 2): points of a frame's border on the plane z = 1 of the camera without shake."""
         focal = vp.focal_px(self.view, self.height, float(self.view.zoom[index]))
         x, y = self.width - 1, self.height - 1
-        at = np.array([(a * x, b * y) for a in (0, 0.5, 1) for b in (0, 0.5, 1)], float)
-        turned = (
-            vp.rays(self.width, self.height, focal, at).astype(float) @ vp.turn(self.view, index).T
+        border_points = np.array([(a * x, b * y) for a in (0, 0.5, 1) for b in (0, 0.5, 1)], float)
+        rotated = (
+            vp.rays(self.width, self.height, focal, border_points).astype(float)
+            @ vp.frame_rotation(self.view, index).T
         )
-        return np.asarray(turned[:, :2] / turned[:, 2:])
+        return np.asarray(rotated[:, :2] / rotated[:, 2:])
 
 
-def draw_plate(world: World, camera: PlateCamera, rest: PlacedThings) -> Plate:
+def draw_plate(world: World, camera: PlateCamera, static: PosedBodies) -> Plate:
     """Render the static scene.
 
     Args:
         world: The world.
         camera: The plate's field.
-        rest: The static things.
+        static: The static bodies.
     """
     width, height = camera.size
     eye = np.asarray(world.viewpoint.position, float)
     shifts = [(x, y) for x in (-0.25, 0.25) for y in (-0.25, 0.25)]
-    fine = [_shaded(world, rest, eye, camera.directions(s)) for s in shifts]
-    shade, lamp = (np.mean([f[k] for f in fine], axis=0, dtype=np.float32) for k in (0, 1))
+    samples = [_shaded(world, static, eye, camera.directions(s)) for s in shifts]
+    ambient_light, direct_light = (
+        np.mean([f[k] for f in samples], axis=0, dtype=np.float32) for k in (0, 1)
+    )
     directions = camera.directions()
-    hits = rest.cast(eye, directions)
-    reach, water = _reach(world, hits.distance, eye, directions)
-    labels = np.where(water, 0, rest.labels[hits.body]).astype(np.uint8)
+    hits = static.cast(eye, directions)
+    ray_lengths, water = _ray_lengths(world, hits.distance, eye, directions)
+    labels = np.where(water, 0, static.labels[hits.body]).astype(np.uint8)
     amodal = {
-        label: _alone(world, label, eye, directions).reshape(height, width)
-        for label in np.unique(rest.labels[rest.labels > 0])
+        label: _unoccluded(world, label, eye, directions).reshape(height, width)
+        for label in np.unique(static.labels[static.labels > 0])
     }
     return Plate(
-        shade.reshape(height, width, 3),
-        lamp.reshape(height, width, 3),
-        (eye + directions * reach[:, None]).astype(np.float32).reshape(height, width, 3),
+        ambient_light.reshape(height, width, 3),
+        direct_light.reshape(height, width, 3),
+        (eye + directions * ray_lengths[:, None]).astype(np.float32).reshape(height, width, 3),
         labels.reshape(height, width),
         amodal,
         water.astype(np.uint8).reshape(height, width),
     )
 
 
-def _reach(
+def _ray_lengths(
     world: World, distance: Floats, eye: NDArray[np.float64], directions: Floats
 ) -> tuple[Floats, NDArray[np.bool_]]:
-    """Distance along rays to the first thing or water, and whether it is water."""
-    reach = np.where(np.isfinite(distance), distance, FAR)
+    """Distance along rays to the first body or water, and whether it is water."""
+    lengths = np.where(np.isfinite(distance), distance, BACKGROUND_DISTANCE)
     if world.water is None:
-        return reach, np.zeros(len(reach), bool)
+        return lengths, np.zeros(len(lengths), bool)
     down = directions[:, 2] < -1e-4
-    level = np.where(down, -eye[2] / np.where(down, directions[:, 2], -1), np.inf)
-    wet = level < reach
-    return np.where(wet, level, reach), wet
+    water_distance = np.where(down, -eye[2] / np.where(down, directions[:, 2], -1), np.inf)
+    is_water = water_distance < lengths
+    return np.where(is_water, water_distance, lengths), is_water
 
 
 def _shaded(
-    world: World, rest: PlacedThings, eye: NDArray[np.float64], directions: Floats
+    world: World, static: PosedBodies, eye: NDArray[np.float64], directions: Floats
 ) -> tuple[Floats, Floats]:
-    """(N, 3) radiance without the lamp, and the part that the lamp adds."""
-    hits = rest.cast(eye, directions)
-    shade, lamp = sky(directions, world.heaven), np.zeros((len(directions), 3), np.float32)
-    met = np.flatnonzero(hits.body >= 0)
-    seen = type(hits)(hits.body[met], hits.face[met], hits.distance[met])
-    points = (eye + directions[met] * seen.distance[:, None]).astype(np.float32)
-    albedo, normals = rest.surface(seen, points, directions[met])
-    shade[met] = albedo * ambient(normals, world.light)
-    sunny = direct(normals, world.light)
-    facing = np.flatnonzero(sunny.any(axis=1))
-    sunny[facing[rest.blocked(points[facing], np.asarray(world.light.sun))]] = 0
-    lamp[met] = albedo * sunny
-    return shade, lamp
+    """(N, 3) radiance without the sun, and the part that the sun adds."""
+    hits = static.cast(eye, directions)
+    ambient_light, direct_light = (
+        sky_radiance(directions, world.sky),
+        np.zeros((len(directions), 3), np.float32),
+    )
+    hit = np.flatnonzero(hits.body >= 0)
+    visible = type(hits)(hits.body[hit], hits.face[hit], hits.distance[hit])
+    points = (eye + directions[hit] * visible.distance[:, None]).astype(np.float32)
+    albedo, normals = static.surface(visible, points, directions[hit])
+    ambient_light[hit] = albedo * ambient(normals, world.light)
+    sunlight = direct(normals, world.light)
+    facing = np.flatnonzero(sunlight.any(axis=1))
+    sunlight[facing[static.occluded(points[facing], np.asarray(world.light.sun))]] = 0
+    direct_light[hit] = albedo * sunlight
+    return ambient_light, direct_light
 
 
-def _alone(
+def _unoccluded(
     world: World, label: int, eye: NDArray[np.float64], directions: Floats
 ) -> NDArray[np.uint8]:
     """(N,): 1 where a static object would be visible without occluders."""
-    things = [t for t in world.things if t.label == label and not t.moves]
-    return (PlacedThings(things, 0).cast(eye, directions).body >= 0).astype(np.uint8)
+    bodies = [t for t in world.bodies if t.label == label and not t.moves]
+    return (PosedBodies(bodies, 0).cast(eye, directions).body >= 0).astype(np.uint8)

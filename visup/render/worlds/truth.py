@@ -13,32 +13,32 @@ from numpy.typing import NDArray
 from visup.render.output.truth import presence_events
 from visup.render.worlds.world import FPS, World
 
-BOX_EVERY = 10
+BOX_INTERVAL = 10
 """Frames from one set of boxes to the next."""
 
 TOLERANCE_S = 0.7
-HIDDEN = 0.3
-"""A thing of which less than this share is visible has no box."""
+MIN_VISIBLE_SHARE = 0.3
+"""A object of which less than this share is visible has no box."""
 
 Mask = NDArray[np.uint8]
 
 
 def world_truth(world: World, frames: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """The content of ``truth.json``; frames from `frame_truth`."""
-    course = world.course
+    truth = world.truth
     return {
         "mission": world.name,
         "name": world.name,
         "world": world.kind,
-        "outcome": course.outcome,
+        "outcome": truth.outcome,
         "camera": world.viewpoint.style,
-        "verdict": course.verdict,
-        "accept": list(course.accept or (course.verdict,)),
+        "verdict": truth.verdict,
+        "accept": list(truth.accept or (truth.verdict,)),
         "task": world.task,
-        "stages": [_rounded(asdict(s)) for s in course.stages],
-        "contacts": [_rounded(asdict(c)) for c in course.contacts],
-        "moves": [_rounded(asdict(m)) for m in course.moves],
-        "alerts": [{"kind": k, "from_s": round(s, 2)} for k, s in course.alerts.items()],
+        "stages": [_rounded(asdict(s)) for s in truth.stages],
+        "contacts": [_rounded(asdict(c)) for c in truth.contacts],
+        "moves": [_rounded(asdict(m)) for m in truth.moves],
+        "alerts": [{"kind": k, "from_s": round(s, 2)} for k, s in truth.alerts.items()],
         "fps": FPS,
         "size": list(world.size),
         "duration_s": round(world.frames / FPS, 3),
@@ -46,9 +46,12 @@ def world_truth(world: World, frames: Sequence[Mapping[str, Any]]) -> dict[str, 
         "roles": dict(world.actors),
         "tolerance_s": TOLERANCE_S,
         "events": [
-            e for name in world.labels if _ever(name, frames) for e in presence_events(name, frames)
+            e
+            for name in world.labels
+            if _ever_in_view(name, frames)
+            for e in presence_events(name, frames)
         ],
-        "boxes": [_boxes(world, f) for f in frames[::BOX_EVERY]],
+        "boxes": [_boxes(world, f) for f in frames[::BOX_INTERVAL]],
         "frames": list(frames),
     }
 
@@ -82,22 +85,24 @@ def outline(mask: NDArray[np.bool_], rng: np.random.Generator) -> list[list[int]
     return [[int(x), int(y)] for x, y in np.clip(np.rint(drawn), 0, limit)]
 
 
-def well_seen(name: str, frames: Sequence[Mapping[str, Any]], size: tuple[int, int]) -> int:
-    """The first frame in which a thing is about as visible as it ever is.
+def best_visible_frame(
+    name: str, frames: Sequence[Mapping[str, Any]], size: tuple[int, int]
+) -> int:
+    """The first frame in which a object is about as visible as it ever is.
 
     Args:
-        name: The thing.
+        name: The object.
         frames: From `frame_truth`.
         size: Width and height.
 
     Returns:
         Index of the frame; the one that shows most of it if it is always truncated or hidden.
     """
-    score = np.array([_seen(f[name], size) for f in frames])
+    score = np.array([_visibility_score(f[name], size) for f in frames])
     return int(np.flatnonzero(score >= 0.9 * score.max())[0])
 
 
-def _seen(record: Mapping[str, Any], size: tuple[int, int]) -> float:
+def _visibility_score(record: Mapping[str, Any], size: tuple[int, int]) -> float:
     """Visible pixels, with a penalty for occlusion and truncation."""
     visible = float(record["visible_px"])
     if not visible:
@@ -107,7 +112,7 @@ def _seen(record: Mapping[str, Any], size: tuple[int, int]) -> float:
     return visible * (visible / max(float(record["amodal_px"]), 1.0)) ** 2 * (0.5 if cut else 1.0)
 
 
-def _ever(name: str, frames: Sequence[Mapping[str, Any]]) -> bool:
+def _ever_in_view(name: str, frames: Sequence[Mapping[str, Any]]) -> bool:
     return any(f[name]["amodal_px"] for f in frames)
 
 
@@ -118,7 +123,7 @@ def _boxes(world: World, frame: Mapping[str, Any]) -> dict[str, Any]:
         record = frame[name]
         if not record["amodal_px"]:
             out[actor] = None
-        elif record["visible_px"] > HIDDEN * record["amodal_px"]:
+        elif record["visible_px"] > MIN_VISIBLE_SHARE * record["amodal_px"]:
             out[actor] = record["bbox"]
     return out
 

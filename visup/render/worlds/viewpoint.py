@@ -10,25 +10,25 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
 from visup.render.scenario.trajectories import look_at
-from visup.render.worlds.motion import clock, eased
+from visup.render.worlds.motion import eased, frame_times
 from visup.render.worlds.world import FPS, Floats, Viewpoint
 
 Doubles = NDArray[np.float64]
-UP = np.array([0.0, 0.0, 1.0])
+WORLD_UP = np.array([0.0, 0.0, 1.0])
 
 
 def base_rotation(view: Viewpoint) -> Doubles:
     """(3, 3) from the frame of the camera at rest (x right, y down, z forward) to the world's."""
     ahead = np.subtract(view.look_at, view.position)
-    steep = abs(ahead[2]) > 0.995 * float(np.linalg.norm(ahead))
-    up = np.array([0.0, 1.0, 0.0]) if steep else UP
+    looks_down = abs(ahead[2]) > 0.995 * float(np.linalg.norm(ahead))
+    up = np.array([0.0, 1.0, 0.0]) if looks_down else WORLD_UP
     turned = look_at(np.asarray(view.position), np.asarray(view.look_at), up)
     return np.asarray(turned.as_matrix(), float)
 
 
-def turn(view: Viewpoint, index: int) -> Doubles:
+def frame_rotation(view: Viewpoint, index: int) -> Doubles:
     """(3, 3) from the camera's frame in a frame of the clip to that of the camera at rest."""
-    pan, tilt, roll = np.radians(view.turns[index])
+    pan, tilt, roll = np.radians(view.rotations_deg[index])
     return np.asarray(Rotation.from_euler("YXZ", [pan, tilt, roll]).as_matrix(), float)
 
 
@@ -37,36 +37,40 @@ def focal_px(view: Viewpoint, height: int, zoom: float = 1.0) -> float:
     return zoom * height / 2 / tan(radians(view.fov_vertical_deg) / 2)
 
 
-def rays(width: int, height: int, focal: float, at: Doubles | None = None) -> Floats:
+def rays(width: int, height: int, focal: float, points: Doubles | None = None) -> Floats:
     """(N, 3) float32 in the camera's frame, z = 1, through all pixels or through points (x, y)."""
-    if at is None:
+    if points is None:
         y, x = np.mgrid[:height, :width]
-        at = np.column_stack([x.ravel(), y.ravel()]).astype(float)
-    flat = (at - [(width - 1) / 2, (height - 1) / 2]) / focal
+        points = np.column_stack([x.ravel(), y.ravel()]).astype(float)
+    flat = (points - [(width - 1) / 2, (height - 1) / 2]) / focal
     return np.column_stack([flat, np.ones(len(flat))]).astype(np.float32)
 
 
-def projected(view: Viewpoint, points: ArrayLike, size: tuple[int, int]) -> Doubles:
+def project(view: Viewpoint, points: ArrayLike, size: tuple[int, int]) -> Doubles:
     """(N, 2) pixels of world points (N, 3) in front of the camera at rest."""
-    own = (np.atleast_2d(np.asarray(points, float)) - view.position) @ base_rotation(view)
+    in_camera = (np.atleast_2d(np.asarray(points, float)) - view.position) @ base_rotation(view)
     middle = np.array([(size[0] - 1) / 2, (size[1] - 1) / 2])
-    return np.asarray(own[:, :2] / own[:, 2:] * focal_px(view, size[1]) + middle)
+    return np.asarray(in_camera[:, :2] / in_camera[:, 2:] * focal_px(view, size[1]) + middle)
 
 
-def shows(view: Viewpoint, points: ArrayLike, size: tuple[int, int], margin: float = 0.06) -> bool:
+def sees_all(
+    view: Viewpoint, points: ArrayLike, size: tuple[int, int], margin: float = 0.06
+) -> bool:
     """Whether the camera at rest sees all points, with a margin as a share of the image."""
-    share = projected(view, points, size) / size
-    return bool(((share > margin) & (share < 1 - margin)).all())
+    position = project(view, points, size) / size
+    return bool(((position > margin) & (position < 1 - margin)).all())
 
 
-def steady(position: ArrayLike, aim: ArrayLike, fov_vertical_deg: float, frames: int) -> Viewpoint:
+def fixed_camera(
+    position: ArrayLike, aim: ArrayLike, fov_vertical_deg: float, frames: int
+) -> Viewpoint:
     """A camera on a tripod; position and aim are (3,), metres."""
     (x, y, z), (a, b, c) = np.asarray(position, float).tolist(), np.asarray(aim, float).tolist()
     zero, one = np.zeros((frames, 3)), np.ones(frames)
     return Viewpoint((x, y, z), (a, b, c), fov_vertical_deg, zero, one, "fixed")
 
 
-def disturbed(view: Viewpoint, rng: np.random.Generator, style: str) -> Viewpoint:
+def with_camera_motion(view: Viewpoint, rng: np.random.Generator, style: str) -> Viewpoint:
     """The same camera with another motion.
 
     Args:
@@ -78,15 +82,15 @@ def disturbed(view: Viewpoint, rng: np.random.Generator, style: str) -> Viewpoin
         A viewpoint that keeps the centre of the scene in view.
     """
     frames = len(view.zoom)
-    size = view.fov_vertical_deg
-    turns, zoom = view.turns, view.zoom
+    fov_deg = view.fov_vertical_deg
+    rotations_deg, zoom = view.rotations_deg, view.zoom
     if style == "shaking":
-        turns = _jitter(rng, frames, rng.uniform(0.004, 0.016) * size)
+        rotations_deg = _jitter(rng, frames, rng.uniform(0.004, 0.016) * fov_deg)
     elif style == "panning":
-        turns = _jitter(rng, frames, 0.002 * size) + _pan(rng, frames, size)
+        rotations_deg = _jitter(rng, frames, 0.002 * fov_deg) + _pan(rng, frames, fov_deg)
     elif style == "zooming":
         zoom = _zoom(rng, frames)
-    return Viewpoint(view.position, view.look_at, view.fov_vertical_deg, turns, zoom, style)
+    return Viewpoint(view.position, view.look_at, view.fov_vertical_deg, rotations_deg, zoom, style)
 
 
 def _jitter(rng: np.random.Generator, frames: int, degrees: float) -> Doubles:
@@ -98,11 +102,11 @@ def _jitter(rng: np.random.Generator, frames: int, degrees: float) -> Doubles:
     return np.asarray(degrees * mix * [1.0, 1.0, 0.4])
 
 
-def _pan(rng: np.random.Generator, frames: int, size: float) -> Doubles:
+def _pan(rng: np.random.Generator, frames: int, fov_deg: float) -> Doubles:
     """(F, 3): the camera turns to one side, or there and back."""
-    t = clock(frames)
+    t = frame_times(frames)
     end = t[-1]
-    reach = rng.choice([-1, 1]) * rng.uniform(0.08, 0.2) * size
+    reach = rng.choice([-1, 1]) * rng.uniform(0.08, 0.2) * fov_deg
     a, b = end * rng.uniform(0.05, 0.3), end * rng.uniform(0.5, 0.9)
     back = rng.choice([-1.0, 0.0, 1.0])
     pan = eased(t, [(a, -reach / 2), ((a + b) / 2, reach / 2), (b, -back * reach / 2)])
@@ -110,8 +114,8 @@ def _pan(rng: np.random.Generator, frames: int, size: float) -> Doubles:
 
 
 def _zoom(rng: np.random.Generator, frames: int) -> Doubles:
-    t = clock(frames)
-    most = rng.uniform(1.12, 1.35)
+    t = frame_times(frames)
+    max_zoom = rng.uniform(1.12, 1.35)
     a, b = t[-1] * rng.uniform(0.05, 0.3), t[-1] * rng.uniform(0.45, 0.9)
-    first, last = (1.0, most) if rng.random() < 0.6 else (most, 1.0)
+    first, last = (1.0, max_zoom) if rng.random() < 0.6 else (max_zoom, 1.0)
     return eased(t, [(a, first), (b, last)])

@@ -1,7 +1,7 @@
-"""The records of a random world: things with a pose for every frame, light, camera and ground truth.
+"""The records of a random world: bodies with a pose for every frame, light, camera and ground truth.
 
 World coordinates are right-handed with z up, in metres; the floor or table is at z = 0. Motion is sampled: a
-moving thing has one pose for each frame, so the renderer does not depend on how a kind simulates it.
+moving body has one pose for each frame, so the renderer does not depend on how a kind simulates it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ SIZE = (480, 360)
 
 @dataclass(frozen=True, slots=True)
 class Surface:
-    """The texture of a thing.
+    """The texture of a body.
 
     Attributes:
         pattern: One of those in `surfaces.py`.
@@ -42,11 +42,11 @@ class Surface:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Thing:
+class RigidBody:
     """A solid and its pose in each frame.
 
     Attributes:
-        name: Its name; things that share a name and a label are one object, such as the links of an arm.
+        name: Its name; bodies that share a name and a label are one object, such as the links of an arm.
         solid: Its mesh.
         poses: (F, 4, 4) from the solid's frame to the world's, or (1, 4, 4) if static.
         label: Value in masks; 0 for scenery.
@@ -67,10 +67,10 @@ class Thing:
 
 @dataclass(frozen=True, slots=True)
 class Daylight:
-    """One distant lamp and ambient light.
+    """A distant sun and ambient light.
 
     Attributes:
-        sun: Direction to the lamp, unit.
+        sun: Direction to the sun, unit.
         sun_colour: Radiance of a white surface perpendicular to it, red, green, blue.
         ambient: Radiance of a white surface that faces up in shadow, red, green, blue.
         softness_px: Standard deviation of the blur of shadow edges.
@@ -83,7 +83,7 @@ class Daylight:
 
 
 @dataclass(frozen=True, slots=True)
-class Heaven:
+class Sky:
     """The sky.
 
     Attributes:
@@ -121,7 +121,7 @@ class Viewpoint:
         position: Metres.
         look_at: The point in the centre of the image without rotation.
         fov_vertical_deg: Vertical field of view at zoom 1.
-        turns: (F, 3) degrees of pan, tilt and roll in each frame.
+        rotations_deg: (F, 3) degrees of pan, tilt and roll in each frame.
         zoom: (F,) magnification in each frame.
         style: fixed, shaking, panning or zooming.
     """
@@ -129,13 +129,13 @@ class Viewpoint:
     position: tuple[float, float, float]
     look_at: tuple[float, float, float]
     fov_vertical_deg: float
-    turns: NDArray[np.float64]
+    rotations_deg: NDArray[np.float64]
     zoom: NDArray[np.float64]
     style: str = "fixed"
 
 
 @dataclass(frozen=True, slots=True)
-class Imager:
+class CameraSensor:
     """The sensor of the camera.
 
     Attributes:
@@ -153,7 +153,7 @@ class Imager:
 
 @dataclass(frozen=True, slots=True)
 class StageSpan:
-    """The course of a stage of the task.
+    """The time and the outcome of a stage of the task.
 
     Attributes:
         stage: Its name in the task file.
@@ -188,8 +188,8 @@ class Motion:
 
 
 @dataclass(frozen=True, slots=True)
-class Course:
-    """The course of a task, as a careful observer would annotate it.
+class TaskTruth:
+    """The ground truth of a task, as a careful observer would annotate it.
 
     Attributes:
         outcome: One of the outcomes of its kind, such as `ok` or `drop`.
@@ -217,15 +217,15 @@ class World:
     Attributes:
         name: Name of its folder.
         kind: Kind of machine at work.
-        things: Its static and moving things.
+        bodies: Its static and moving bodies.
         viewpoint: The camera.
         light: The light.
-        heaven: The sky.
-        imager: The sensor.
+        sky: The sky.
+        sensor: The sensor.
         task: Name of its task file, without suffix.
         task_text: The task in visup's language.
-        actors: Actor of the task -> name of the thing.
-        course: Ground truth.
+        actors: Actor of the task -> name of the body.
+        truth: Ground truth.
         frames: Number of frames.
         water: The water, if there is any.
         seed: Seed of the noise.
@@ -234,15 +234,15 @@ class World:
 
     name: str
     kind: str
-    things: tuple[Thing, ...]
+    bodies: tuple[RigidBody, ...]
     viewpoint: Viewpoint
     light: Daylight
-    heaven: Heaven
-    imager: Imager
+    sky: Sky
+    sensor: CameraSensor
     task: str
     task_text: str
     actors: Mapping[str, str]
-    course: Course
+    truth: TaskTruth
     frames: int
     water: Water | None = None
     seed: int = 0
@@ -251,5 +251,5 @@ class World:
     @property
     def labels(self) -> dict[str, int]:
         """Labelled objects and their values in masks, in order of these."""
-        found = {t.name: t.label for t in self.things if t.label}
+        found = {t.name: t.label for t in self.bodies if t.label}
         return dict(sorted(found.items(), key=lambda item: item[1]))

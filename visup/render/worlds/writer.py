@@ -18,14 +18,14 @@ from visup.render.output.clip_folder import (
     write_mask,
 )
 from visup.render.output.truth import frame_truth
-from visup.render.worlds.frames import WorldRenderer
-from visup.render.worlds.lesson import lesson
-from visup.render.worlds.truth import outline, well_seen, world_brief, world_truth
+from visup.render.worlds.teaching_clip import teaching_world
+from visup.render.worlds.truth import best_visible_frame, outline, world_brief, world_truth
 from visup.render.worlds.world import FPS, World
+from visup.render.worlds.world_renderer import WorldRenderer
 
 Masks = list[NDArray[np.uint8]]
-LEAST_PX = 60
-"""A thing with fewer visible pixels in the second clip is outlined in the clip itself."""
+MIN_VISIBLE_PX = 60
+"""A object with fewer visible pixels in the second clip is outlined in the clip itself."""
 
 
 def write_world(
@@ -52,11 +52,11 @@ def write_world(
     frames, masks = [], []
     with ClipWriter(out / "video.mp4", FPS, world.size) as video:
         for index in range(world.frames):
-            picture = renderer.picture(index)
-            video.write(picture.image)
-            write_mask(out, index, picture.mask)
-            frames.append(frame_truth(picture, world.labels))
-            masks.append(picture.mask)
+            frame = renderer.render(index)
+            video.write(frame.image)
+            write_mask(out, index, frame.mask)
+            frames.append(frame_truth(frame, world.labels))
+            masks.append(frame.mask)
             if progress is not None:
                 progress(index + 1, world.frames)
     truth = world_truth(world, frames)
@@ -69,30 +69,34 @@ def write_world(
 
 def _teach(world: World, out: Path, frames: list[dict[str, Any]], masks: Masks) -> dict[str, Any]:
     """For each actor the clip, the frame and the outline that a user would draw."""
-    best = {a: well_seen(name, frames, world.size) for a, name in world.actors.items()}
-    teach = {a: _shown(world, a, at, masks[at]) for a, at in best.items()}
-    other = lesson(world)
-    return teach if other is None else _lesson(other, out, best) or teach
+    best_frames = {
+        a: best_visible_frame(name, frames, world.size) for a, name in world.actors.items()
+    }
+    teach = {a: _outline_record(world, a, index, masks[index]) for a, index in best_frames.items()}
+    other = teaching_world(world)
+    return teach if other is None else _write_teaching_clip(other, out, best_frames) or teach
 
 
-def _shown(world: World, actor: str, at: int, mask: NDArray[np.uint8]) -> dict[str, Any]:
+def _outline_record(
+    world: World, actor: str, index: int, mask: NDArray[np.uint8]
+) -> dict[str, Any]:
     label = world.labels[world.actors[actor]]
     rng = np.random.default_rng([world.seed, 1, label])
-    return {"clip": world.name, "frame": at, "polygon": outline(mask == label, rng)}
+    return {"clip": world.name, "frame": index, "polygon": outline(mask == label, rng)}
 
 
-def _lesson(world: World, out: Path, best: dict[str, int]) -> dict[str, Any]:
-    """Write a clip of only the frames in which things are well visible; nothing if one of them never is."""
+def _write_teaching_clip(world: World, out: Path, best_frames: dict[str, int]) -> dict[str, Any]:
+    """Write a clip of only the frames in which objects are well visible; nothing if one of them never is."""
     renderer = WorldRenderer(world)
-    pictures = [renderer.picture(at) for at in best.values()]
-    pairs = list(zip(best, pictures, strict=True))
+    rendered = [renderer.render(index) for index in best_frames.values()]
+    pairs = list(zip(best_frames, rendered, strict=True))
     labels = {actor: world.labels[name] for actor, name in world.actors.items()}
-    if any(np.count_nonzero(p.mask == labels[a]) < LEAST_PX for a, p in pairs):
+    if any(np.count_nonzero(p.mask == labels[a]) < MIN_VISIBLE_PX for a, p in pairs):
         return {}
     folder = out.resolve().parent / world.name
     make_clip_folder(folder)
     with ClipWriter(folder / "video.mp4", FPS, world.size) as video:
-        for index, picture in enumerate(pictures):
-            video.write(picture.image)
-            write_mask(folder, index, picture.mask)
-    return {a: _shown(world, a, index, p.mask) for index, (a, p) in enumerate(pairs)}
+        for index, frame in enumerate(rendered):
+            video.write(frame.image)
+            write_mask(folder, index, frame.mask)
+    return {a: _outline_record(world, a, index, p.mask) for index, (a, p) in enumerate(pairs)}

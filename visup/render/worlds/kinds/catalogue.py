@@ -65,15 +65,18 @@ def random_world(kind: str, seed: int, outcome: str | None = None) -> World:
         SettingsError: The kind does not exist, or does not have that outcome.
     """
     known_kinds((kind,))
-    chosen = KINDS[kind]
+    world_kind = KINDS[kind]
     # With the kind in the seed, kinds draw different numbers from the same seed.
     rng = np.random.default_rng([seed, zlib.crc32(kind.encode())])
-    drawn = chosen.outcomes[0]
+    drawn = world_kind.outcomes[0]
     if rng.random() > 0.35:
-        drawn = chosen.outcomes[int(rng.integers(1, len(chosen.outcomes)))]
-    if outcome is not None and outcome not in chosen.outcomes:
+        drawn = world_kind.outcomes[int(rng.integers(1, len(world_kind.outcomes)))]
+    if outcome is not None and outcome not in world_kind.outcomes:
         raise SettingsError(
-            f"a world of kind {kind!r} cannot go {outcome!r}", expected=", ".join(chosen.outcomes)
+            f"a world of kind {kind!r} cannot go {outcome!r}",
+            expected=", ".join(world_kind.outcomes),
         )
-    way = outcome or drawn
-    return replace(chosen.build(rng, way), name=f"{kind}_{seed:04d}_{way}")
+    chosen_outcome = outcome or drawn
+    return replace(
+        world_kind.build(rng, chosen_outcome), name=f"{kind}_{seed:04d}_{chosen_outcome}"
+    )

@@ -8,27 +8,40 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.render.meshes.solids import Colour, Solid, box, cone, join
+from visup.render.worlds.assets import clutter, machines
+from visup.render.worlds.assets.scenery import (
+    distinct_colour,
+    hall,
+    meadow,
+    pick_colour,
+    random_seed,
+)
 from visup.render.worlds.kinds.kind import (
     Script,
-    cut_short,
-    finished,
+    complete_world,
     frames_until,
-    from_around,
+    random_camera_position,
     random_view,
-    spans,
+    stage_spans,
+    truncated,
 )
-from visup.render.worlds.motion import along, bend, clock, cruised, frame_at, posed
-from visup.render.worlds.things import clutter, machines
-from visup.render.worlds.things.scenery import hall, meadow, pick_colour, seed_of, unlike
-from visup.render.worlds.viewpoint import shows
+from visup.render.worlds.motion import (
+    frame_at,
+    frame_times,
+    make_poses,
+    path_positions,
+    quadratic_bezier,
+    trapezoidal_profile,
+)
+from visup.render.worlds.viewpoint import sees_all
 from visup.render.worlds.world import (
     SIZE,
     Contact,
-    Course,
     Motion,
     Poses,
+    RigidBody,
     Surface,
-    Thing,
+    TaskTruth,
     Viewpoint,
     World,
 )
@@ -84,24 +97,26 @@ def build(rng: np.random.Generator, outcome: str) -> World:
     colour = pick_colour(rng, bool(rng.random() < 0.7))
     tug, length = machines.vehicle(rng, colour)
     cart_length = float(rng.uniform(0.7, 1.0))
-    cart = _cart(rng, cart_length, unlike(rng, [colour]))
+    cart = _cart(rng, cart_length, distinct_colour(rng, [colour]))
     times = _times(rng, outcome)
     frames = frames_until(times.end)
     layout, view = _layout(rng, (length + cart_length) / 2, frames)
     at, heading = _drive(layout, times, frames)
-    pulled = _cart_poses(layout, times, at, outcome, frames)
-    surface = Surface("grain", 0.3, float(rng.uniform(0.05, 0.2)), seed_of(rng))
-    things = [
-        Thing("tug", tug, posed(np.column_stack([at, np.zeros(frames)]), heading), TUG, surface),
-        Thing("cart", cart, pulled, CART, surface),
+    cart_poses = _cart_poses(layout, times, at, outcome, frames)
+    surface = Surface("grain", 0.3, float(rng.uniform(0.05, 0.2)), random_seed(rng))
+    bodies = [
+        RigidBody(
+            "tug", tug, make_poses(np.column_stack([at, np.zeros(frames)]), heading), TUG, surface
+        ),
+        RigidBody("cart", cart, cart_poses, CART, surface),
         *_surroundings(rng, layout, cart, frames),
     ]
-    truth = _course(outcome, times)
+    truth = _truth(outcome, times)
     if outcome == "in_progress":
         end = float(rng.uniform(times.begin + 1.5, times.meet - 0.3))
-        truth, frames = cut_short(truth, end), frames_until(end)
-    script = Script(things, view, ("fetch", TASK), ("tug", "cart"), truth, frames)
-    return finished(rng, "fetch", script)
+        truth, frames = truncated(truth, end), frames_until(end)
+    script = Script(bodies, view, ("fetch", TASK), ("tug", "cart"), truth, frames)
+    return complete_world(rng, "fetch", script)
 
 
 def _times(rng: np.random.Generator, outcome: str) -> FetchTimes:
@@ -124,7 +139,7 @@ def _layout(rng: np.random.Generator, reach: float, frames: int) -> tuple[FetchL
         start = np.array([-side * rng.uniform(1.4, 2.6), rng.uniform(-1.2, 1.2)])
         goal = -ahead * rng.uniform(1.5, 2.1) + np.array([0, rng.uniform(-0.5, 0.5)])
         aim = np.array([0.0, 0.0, 0.3])
-        place = from_around(rng, aim, float(rng.uniform(4.8, 6.2)), (20, 50))
+        place = random_camera_position(rng, aim, float(rng.uniform(4.8, 6.2)), (20, 50))
         view = random_view(rng, place, aim, frames)
         points = [
             [*cart, 0],
@@ -133,18 +148,20 @@ def _layout(rng: np.random.Generator, reach: float, frames: int) -> tuple[FetchL
             [*(meet + goal), 0],
             [*start, 0.3],
         ]
-        if shows(view, points, SIZE, 0.1):
+        if sees_all(view, points, SIZE, 0.1):
             break
     return FetchLayout(cart, ahead, start, meet, goal), view
 
 
 def _drive(layout: FetchLayout, times: FetchTimes, frames: int) -> tuple[Doubles, Doubles]:
     """(F, 2) positions and (F,) headings of the tug: forward to the cart, backward from it."""
-    t = clock(frames)
+    t = frame_times(frames)
     straight = layout.meet - 0.6 * layout.ahead
-    curve = bend(layout.start, straight - 0.9 * layout.ahead, straight)
-    at, heading = along(np.concatenate([curve, [layout.meet]]), cruised(t, times.begin, times.meet))
-    back = cruised(t, times.haul, times.stop)
+    curve = quadratic_bezier(layout.start, straight - 0.9 * layout.ahead, straight)
+    at, heading = path_positions(
+        np.concatenate([curve, [layout.meet]]), trapezoidal_profile(t, times.begin, times.meet)
+    )
+    back = trapezoidal_profile(t, times.haul, times.stop)
     return at + np.outer(back, layout.goal), heading
 
 
@@ -162,56 +179,60 @@ def _cart_poses(
             # It rolls on for a moment.
             speed = shift[last - 1] - shift[last - 2]
             shift[last:] += np.outer(6 * (1 - np.exp(-np.arange(frames - last) / 6)), speed)
-    return posed(np.column_stack([layout.cart + shift, np.zeros(frames)]), yaw)
+    return make_poses(np.column_stack([layout.cart + shift, np.zeros(frames)]), yaw)
 
 
 def _cart(rng: np.random.Generator, length: float, colour: Colour) -> Solid:
     """A cart with a load."""
-    wide, r = length * 0.62, 0.09
-    bed = box((length, wide, 0.1), (0, 0, 0.26), colour)
+    width, wheel_radius = length * 0.62, 0.09
+    bed = box((length, width, 0.1), (0, 0, 0.26), colour)
     load = pick_colour(rng, bool(rng.random() < 0.5))
     style = rng.integers(3)
     if style == 0:
-        cargo = box((0.6 * length, 0.8 * wide, 0.3), (0.05 * length, 0, 0.46), load)
+        cargo = box((0.6 * length, 0.8 * width, 0.3), (0.05 * length, 0, 0.46), load)
     elif style == 1:
-        cargo = cone((0, 0, 0.31), (0, 0, 0.75), 0.36 * wide, None, load)
+        cargo = cone((0, 0, 0.31), (0, 0, 0.75), 0.36 * width, None, load)
     else:
-        low = box((0.8 * length, 0.85 * wide, 0.2), (0, 0, 0.41), load)
-        cargo = join(low, box((0.4 * length, 0.5 * wide, 0.2), (-0.1 * length, 0, 0.6), colour))
-    return join(bed, machines.wheels(length, wide, r), cargo)
+        low = box((0.8 * length, 0.85 * width, 0.2), (0, 0, 0.41), load)
+        cargo = join(low, box((0.4 * length, 0.5 * width, 0.2), (-0.1 * length, 0, 0.6), colour))
+    return join(bed, machines.wheels(length, width, wheel_radius), cargo)
 
 
 def _surroundings(
     rng: np.random.Generator, layout: FetchLayout, cart: Solid, frames: int
-) -> list[Thing]:
+) -> list[RigidBody]:
     found = list(hall(rng, float(rng.uniform(2.8, 5.0))) if rng.random() < 0.6 else meadow(rng))
-    free = clutter.corridor(layout.start, layout.meet, 1.8)
-    free += clutter.corridor(layout.cart + layout.ahead, layout.meet + 1.5 * layout.goal, 2.2)
+    corridors = clutter.free_corridor(layout.start, layout.meet, 1.8)
+    corridors += clutter.free_corridor(
+        layout.cart + layout.ahead, layout.meet + 1.5 * layout.goal, 2.2
+    )
     if rng.random() < 0.3:
         x, y = rng.uniform([-2.5, 0.8], [2.5, 2.0])
-        if all(np.hypot(x - a, y - b) > r + 0.7 for a, b, r in free):
+        if all(np.hypot(x - a, y - b) > r + 0.7 for a, b, r in corridors):
             found.append(
-                Thing("decoy", cart, posed([x, y, 0.0], float(rng.uniform(0, 6.3))), DECOY)
+                RigidBody("decoy", cart, make_poses([x, y, 0.0], float(rng.uniform(0, 6.3))), DECOY)
             )
-            free.append((float(x), float(y), 0.8))
-    found += clutter.scattered(rng, int(rng.integers(0, 5)), 0.2, (-3.5, 3.5, -2.5, 2.2), free)
+            corridors.append((float(x), float(y), 0.8))
+    found += clutter.scattered(rng, int(rng.integers(0, 5)), 0.2, (-3.5, 3.5, -2.5, 2.2), corridors)
     if rng.random() < 0.2:
         found += clutter.passer_by(rng, frames, (-4.5, 2.1), (4.5, 2.1), BYSTANDER)
     return found
 
 
-def _course(outcome: str, times: FetchTimes) -> Course:
+def _truth(outcome: str, times: FetchTimes) -> TaskTruth:
     """Ground truth."""
     t = times
     moves: tuple[Motion, ...] = (Motion("tug", t.begin, t.meet), Motion("tug", t.haul, t.stop))
-    stages = spans(("approach", t.begin, t.meet), ("coupling", t.meet, t.haul))
+    stages = stage_spans(("approach", t.begin, t.meet), ("coupling", t.meet, t.haul))
     if outcome == "never":
         touch = (Contact("tug", "cart", t.meet, t.haul),)
-        stages += spans(("haul", t.haul, t.stop, "failing"))
-        return Course(outcome, "failed", stages, (), touch, moves)
+        stages += stage_spans(("haul", t.haul, t.stop, "failing"))
+        return TaskTruth(outcome, "failed", stages, (), touch, moves)
     moves += (Motion("cart", t.haul, min(t.stop, t.loses + 0.4)),)
     touch = (Contact("tug", "cart", t.meet, min(t.end, t.loses)),)
     if outcome == "loses":
-        stages += spans(("haul", t.haul, t.loses, "failing"))
-        return Course(outcome, "failed", stages, (), touch, moves)
-    return Course(outcome, "succeeded", stages + spans(("haul", t.haul, t.stop)), (), touch, moves)
+        stages += stage_spans(("haul", t.haul, t.loses, "failing"))
+        return TaskTruth(outcome, "failed", stages, (), touch, moves)
+    return TaskTruth(
+        outcome, "succeeded", stages + stage_spans(("haul", t.haul, t.stop)), (), touch, moves
+    )

@@ -8,30 +8,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.render.meshes.solids import Colour, Solid, box, cone, join
-from visup.render.worlds.kinds.kind import (
-    Script,
-    cut_short,
-    finished,
-    frames_until,
-    from_around,
-    random_view,
-    spans,
-)
-from visup.render.worlds.motion import carried, clock, dropped, eased, frame_at, posed
-from visup.render.worlds.things import clutter
-from visup.render.worlds.things.robot import (
-    RobotCourse,
+from visup.render.worlds.assets import clutter
+from visup.render.worlds.assets.robot import (
     RobotDesign,
+    TipTrajectory,
     hand_poses,
     random_robot,
-    robot_things,
+    robot_bodies,
 )
-from visup.render.worlds.things.scenery import pick_colour, seed_of, tabletop, unlike
-from visup.render.worlds.world import Contact, Course, Motion, Poses, Surface, Thing, World
+from visup.render.worlds.assets.scenery import distinct_colour, pick_colour, random_seed, tabletop
+from visup.render.worlds.kinds.kind import (
+    Script,
+    complete_world,
+    frames_until,
+    random_camera_position,
+    random_view,
+    stage_spans,
+    truncated,
+)
+from visup.render.worlds.motion import carried, dropped, eased, frame_at, frame_times, make_poses
+from visup.render.worlds.world import Contact, Motion, Poses, RigidBody, Surface, TaskTruth, World
 
 OUTCOMES = ("ok", "drop", "never", "in_progress")
 GIVER, PAYLOAD, RECEIVER, GIVER_ARM, RECEIVER_ARM = 2, 3, 4, 5, 6
-LEVEL = 0.26
+HANDOVER_HEIGHT = 0.26
 """Height at which the bar changes hands, metres."""
 
 Doubles = NDArray[np.float64]
@@ -66,37 +66,39 @@ def build(rng: np.random.Generator, outcome: str) -> World:
     side = float(rng.choice([-1, 1]))
     giver = random_robot(rng, (-0.55 * side, float(rng.uniform(0.0, 0.15))), 0.74)
     receiver = random_robot(rng, (0.55 * side, float(rng.uniform(0.0, 0.15))), 0.74)
-    half, thick = float(rng.uniform(0.085, 0.12)), float(rng.uniform(0.016, 0.026))
-    colour = unlike(rng, [giver.colour, receiver.colour])
+    half_length, half_thickness = float(rng.uniform(0.085, 0.12)), float(rng.uniform(0.016, 0.026))
+    colour = distinct_colour(rng, [giver.colour, receiver.colour])
     times = _times(rng)
     frames = frames_until(times.end)
-    meet = np.array([rng.uniform(-0.06, 0.06), rng.uniform(-0.16, 0.02), LEVEL])
-    grip = np.array([side * half * 0.72, 0, 0])
-    gives = Partner.for_bar(giver, meet - grip, thick)
-    takes = Partner.for_bar(receiver, meet + grip, thick)
-    first = _giver_course(rng, gives, times, outcome, frames)
-    second = _receiver_course(rng, takes, times, outcome, frames)
+    meet = np.array([rng.uniform(-0.06, 0.06), rng.uniform(-0.16, 0.02), HANDOVER_HEIGHT])
+    grip = np.array([side * half_length * 0.72, 0, 0])
+    gives = HandoverArm.for_bar(giver, meet - grip, half_thickness)
+    takes = HandoverArm.for_bar(receiver, meet + grip, half_thickness)
+    first = _giver_trajectory(rng, gives, times, outcome, frames)
+    second = _receiver_trajectory(rng, takes, times, outcome, frames)
     hands = hand_poses(giver, first), hand_poses(receiver, second)
     payload, drop_s = _payload_poses(rng, hands, times, outcome, meet)
-    surface = Surface("grain", 0.05, float(rng.uniform(0.02, 0.2)), seed_of(rng))
+    surface = Surface("grain", 0.05, float(rng.uniform(0.02, 0.2)), random_seed(rng))
     whole = bool(rng.random() < 0.6)
     aim = np.array([0.0, 0.0, 0.2])
-    place = from_around(rng, aim, float(rng.uniform(1.3, 1.6)), (12, 45))
+    place = random_camera_position(rng, aim, float(rng.uniform(1.3, 1.6)), (12, 45))
     view = random_view(rng, place, aim, frames)
-    things = [
-        *robot_things(giver, first, "giver", GIVER, GIVER if whole else GIVER_ARM),
-        *robot_things(receiver, second, "receiver", RECEIVER, RECEIVER if whole else RECEIVER_ARM),
-        Thing("payload", _bar(rng, half, thick, colour), payload, PAYLOAD, surface),
+    bodies = [
+        *robot_bodies(giver, first, "giver", GIVER, GIVER if whole else GIVER_ARM),
+        *robot_bodies(receiver, second, "receiver", RECEIVER, RECEIVER if whole else RECEIVER_ARM),
+        RigidBody(
+            "payload", _bar(rng, half_length, half_thickness, colour), payload, PAYLOAD, surface
+        ),
         *_surroundings(rng, giver, receiver),
     ]
-    truth = _course(times, outcome, drop_s)
+    truth = _truth(times, outcome, drop_s)
     if outcome == "in_progress":
         end = float(rng.uniform(times.offer + 0.9, times.take - 0.2))
-        truth, frames = cut_short(truth, end), frames_until(end)
+        truth, frames = truncated(truth, end), frames_until(end)
     script = Script(
-        things, view, ("handover", TASK), ("giver", "payload", "receiver"), truth, frames
+        bodies, view, ("handover", TASK), ("giver", "payload", "receiver"), truth, frames
     )
-    return finished(rng, "handover", script)
+    return complete_world(rng, "handover", script)
 
 
 def _times(rng: np.random.Generator) -> HandoverTimes:
@@ -112,63 +114,63 @@ def _times(rng: np.random.Generator) -> HandoverTimes:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Partner:
+class HandoverArm:
     """One of the two arms.
 
     Attributes:
         design: The arm.
         goal: (3,) position of its tip during the handover, metres.
-        tight: Distance of its fingers when they hold the bar, metres.
-        wide: The same when they do not.
+        grasp_width: Distance of its fingers when they hold the bar, metres.
+        open_width: The same when they do not.
     """
 
     design: RobotDesign
     goal: Doubles
-    tight: float
-    wide: float
+    grasp_width: float
+    open_width: float
 
     @classmethod
-    def for_bar(cls, design: RobotDesign, goal: Doubles, thick: float) -> Partner:
+    def for_bar(cls, design: RobotDesign, goal: Doubles, half_thickness: float) -> HandoverArm:
         """An arm with fingers for a bar of half a thickness, metres."""
-        return cls(design, goal, 2 * thick, 2 * thick + 0.05)
+        return cls(design, goal, 2 * half_thickness, 2 * half_thickness + 0.05)
 
     def random_home(self, rng: np.random.Generator) -> Doubles:
         """(3,) rest position of its tip: on its own side, slightly in front of the foot."""
-        x, y = self.design.foot[:2]
+        x, y = self.design.base[:2]
         return np.array([0.62 * x, y - 0.12, float(rng.uniform(0.3, 0.4))])
 
 
-def _giver_course(
-    rng: np.random.Generator, arm: Partner, t: HandoverTimes, outcome: str, frames: int
-) -> RobotCourse:
+def _giver_trajectory(
+    rng: np.random.Generator, arm: HandoverArm, t: HandoverTimes, outcome: str, frames: int
+) -> TipTrajectory:
     home = arm.random_home(rng)
     keys = [(t.begin, home), (t.reach - 0.3, arm.goal), (t.back, arm.goal), (t.back + 1.8, home)]
-    loose = t.reach - 0.05 if outcome == "drop" else t.release
-    grip = [(loose, arm.tight), (loose + 0.3, arm.wide)]
-    return _course_of(rng, keys, grip if outcome != "never" else [(0.0, arm.tight)], frames)
+    release = t.reach - 0.05 if outcome == "drop" else t.release
+    grip = [(release, arm.grasp_width), (release + 0.3, arm.open_width)]
+    return _trajectory(rng, keys, grip if outcome != "never" else [(0.0, arm.grasp_width)], frames)
 
 
-def _receiver_course(
-    rng: np.random.Generator, arm: Partner, t: HandoverTimes, outcome: str, frames: int
-) -> RobotCourse:
+def _receiver_trajectory(
+    rng: np.random.Generator, arm: HandoverArm, t: HandoverTimes, outcome: str, frames: int
+) -> TipTrajectory:
     home, goal = arm.random_home(rng), arm.goal
-    ready = goal + np.array([0.12 * np.sign(arm.design.foot[0]), 0, 0])
+    ready = goal + np.array([0.12 * np.sign(arm.design.base[0]), 0, 0])
     between = t.offer + 0.7 * (t.reach - t.offer)
     leave = t.back + 0.3 if outcome != "never" else t.take + 0.4
     keys = [(t.offer, home), (between, ready), (t.reach, goal), (leave, goal), (leave + 2.0, home)]
-    shut = arm.wide - 0.015 if outcome == "never" else arm.tight
-    return _course_of(rng, keys, [(t.reach, arm.wide), (t.take, shut)], frames)
+    closed_width = arm.open_width - 0.015 if outcome == "never" else arm.grasp_width
+    return _trajectory(rng, keys, [(t.reach, arm.open_width), (t.take, closed_width)], frames)
 
 
-def _course_of(
+def _trajectory(
     rng: np.random.Generator,
     keys: list[tuple[float, Doubles]],
     grip: list[tuple[float, float]],
     frames: int,
-) -> RobotCourse:
-    at = clock(frames)
+) -> TipTrajectory:
+    at = frame_times(frames)
     lean = np.full(frames, float(rng.uniform(0.8, 1.2)))
-    return RobotCourse(eased(at, keys), eased(at, grip), np.full(frames, np.pi / 2), lean)
+    return TipTrajectory(eased(at, keys), eased(at, grip), np.full(frames, np.pi / 2), lean)
 
 
 def _payload_poses(
@@ -185,7 +187,7 @@ def _payload_poses(
     (giver, receiver), t = hands, times
     frames = len(giver)
     change = frame_at(t.reach - 0.25)
-    level = posed(meet)[0]
+    level = make_poses(meet)[0]
     with_giver = giver @ np.linalg.inv(giver[min(change, frames - 1)]) @ level
     if outcome == "never":
         return with_giver, t.end + 1
@@ -199,42 +201,50 @@ def _payload_poses(
     return whole, t.end + 1
 
 
-def _bar(rng: np.random.Generator, half: float, thick: float, colour: Colour) -> Solid:
+def _bar(
+    rng: np.random.Generator, half_length: float, half_thickness: float, colour: Colour
+) -> Solid:
     """A bar along x about its middle."""
     style = rng.integers(3)
     if style == 0:
-        return box((2 * half, 2 * thick, 2 * thick), (0, 0, 0), colour)
-    rod = cone((-half, 0, 0), (half, 0, 0), thick, None, colour)
+        return box((2 * half_length, 2 * half_thickness, 2 * half_thickness), (0, 0, 0), colour)
+    rod = cone((-half_length, 0, 0), (half_length, 0, 0), half_thickness, None, colour)
     if style == 1:
         return rod
-    ring = cone((-0.25 * half, 0, 0), (0.25 * half, 0, 0), 1.25 * thick, None, pick_colour(rng))
+    ring = cone(
+        (-0.25 * half_length, 0, 0),
+        (0.25 * half_length, 0, 0),
+        1.25 * half_thickness,
+        None,
+        pick_colour(rng),
+    )
     return join(rod, ring)
 
 
 def _surroundings(
     rng: np.random.Generator, giver: RobotDesign, receiver: RobotDesign
-) -> list[Thing]:
-    taken = [(0.0, 0.0, 0.2), (*giver.foot, 0.15), (*receiver.foot, 0.15)]
+) -> list[RigidBody]:
+    occupied = [(0.0, 0.0, 0.2), (*giver.base, 0.15), (*receiver.base, 0.15)]
     found = list(tabletop(rng, float(rng.uniform(1.6, 2.2)), 1.1))
     return found + clutter.scattered(
-        rng, int(rng.integers(0, 6)), 0.03, (-0.7, 0.7, -0.4, 0.5), taken
+        rng, int(rng.integers(0, 6)), 0.03, (-0.7, 0.7, -0.4, 0.5), occupied
     )
 
 
-def _course(times: HandoverTimes, outcome: str, drop_s: float) -> Course:
+def _truth(times: HandoverTimes, outcome: str, drop_s: float) -> TaskTruth:
     """Ground truth."""
     t = times
     offer = ("offer", t.offer, t.take)
     moves: tuple[Motion, ...] = (Motion("payload", t.begin, t.reach - 0.3),)
     first = Contact("giver", "payload", 0.0, min(t.release, drop_s))
     if outcome == "drop":
-        stages = spans(("offer", t.offer, drop_s, "failing"))
-        return Course(outcome, "failed", stages, ("failed", "in_progress"), (first,), moves)
+        stages = stage_spans(("offer", t.offer, drop_s, "failing"))
+        return TaskTruth(outcome, "failed", stages, ("failed", "in_progress"), (first,), moves)
     if outcome == "never":
-        stages = spans(("offer", t.offer, t.reach), ("take", t.take, t.take + 0.4, "failing"))
+        stages = stage_spans(("offer", t.offer, t.reach), ("take", t.take, t.take + 0.4, "failing"))
         whole = (Contact("giver", "payload", 0.0, t.end),)
-        return Course(outcome, "failed", stages, ("failed", "in_progress"), whole, moves)
-    stages = spans(offer, ("take", t.take, t.release), ("release", t.release, t.end))
+        return TaskTruth(outcome, "failed", stages, ("failed", "in_progress"), whole, moves)
+    stages = stage_spans(offer, ("take", t.take, t.release), ("release", t.release, t.end))
     moves += (Motion("payload", t.back + 0.3, t.back + 2.3),)
     both = (first, Contact("receiver", "payload", t.take, t.end))
-    return Course(outcome, "succeeded", stages, (), both, moves)
+    return TaskTruth(outcome, "succeeded", stages, (), both, moves)

@@ -11,26 +11,40 @@ from scipy.spatial.distance import cdist
 
 from visup.render.meshes.solids import Colour, Solid, box, cone, join
 from visup.render.meshes.spacecraft import mesh
-from visup.render.worlds.kinds.kind import Script, bearing, cut_short, finished, frames_until, spans
-from visup.render.worlds.motion import clock, dropped, eased, frame_at, posed, still
-from visup.render.worlds.things import clutter, machines
-from visup.render.worlds.things.scenery import (
+from visup.render.worlds.assets import clutter, machines
+from visup.render.worlds.assets.scenery import (
+    distinct_colour,
     hall,
     meadow,
     pick_colour,
-    seed_of,
-    unlike,
+    random_seed,
 )
-from visup.render.worlds.viewpoint import disturbed, projected, steady
+from visup.render.worlds.kinds.kind import (
+    Script,
+    complete_world,
+    direction_from_angles,
+    frames_until,
+    stage_spans,
+    truncated,
+)
+from visup.render.worlds.motion import (
+    dropped,
+    eased,
+    frame_at,
+    frame_times,
+    make_poses,
+    static_pose,
+)
+from visup.render.worlds.viewpoint import fixed_camera, project, with_camera_motion
 from visup.render.worlds.world import (
     FPS,
     SIZE,
     Contact,
-    Course,
     Motion,
     Poses,
+    RigidBody,
     Surface,
-    Thing,
+    TaskTruth,
     Viewpoint,
     World,
 )
@@ -50,7 +64,7 @@ STATUES = (
     "espresso",
 )
 HOLD_S = 5
-CLEAR_PX = 12
+MIN_CLEAR_GAP_PX = 12
 """Image distance between both, pixels, in flights that are clear of the station."""
 
 Doubles = NDArray[np.float64]
@@ -79,42 +93,42 @@ def build(rng: np.random.Generator, outcome: str) -> World:
     """A world in which a station is inspected; `outcome` is one of `OUTCOMES`."""
     flies = bool(rng.random() < 0.65)
     station, height = _station(rng)
-    colour = unlike(rng, [(0.4, 0.4, 0.4)])
+    colour = distinct_colour(rng, [(0.4, 0.4, 0.4)])
     craft, level = _craft(rng, colour, height, flies)
     radius = float(np.linalg.norm(station.vertices[:, :2], axis=1).max() + rng.uniform(0.9, 1.5))
     times = _times(rng, outcome)
     frames = frames_until(times.end)
-    standing = still(0, 0, 0, float(rng.uniform(0, 6.3)))
+    standing = static_pose(0, 0, 0, float(rng.uniform(0, 6.3)))
     # Some pass in front of or behind the station, which looks like contact in the image but is not.
     crossing = bool(rng.random() < 0.2)
-    for least in (55, 65, 72, 78, 82, 85):
-        view = _view(rng, (radius, height), least, frames)
+    for min_elevation_deg in (55, 65, 72, 78, 82, 85):
+        view = _view(rng, (radius, height), min_elevation_deg, frames)
         poses, hit_s = _flight(rng, (station, craft), (radius, level), times, outcome, frames)
         gaps = _gaps(view, station, standing, craft, poses)
         free = gaps[: frame_at(min(hit_s - 1.5, times.end))]
-        if crossing or free.min() > CLEAR_PX:
+        if crossing or free.min() > MIN_CLEAR_GAP_PX:
             break
         radius += 0.12
-    truth, limit = _course(times, outcome, gaps, hit_s)
+    truth, limit = _truth(times, outcome, gaps, hit_s)
     if outcome == "in_progress":
         end = times.arrive + float(rng.uniform(1.5, 3.5))
-        truth, frames = cut_short(truth, end), frames_until(end)
+        truth, frames = truncated(truth, end), frames_until(end)
     wording = "< {} px" if rng.random() < 0.5 else "between 3 px and {} px"
-    surface = Surface("grain", 0.4, float(rng.uniform(0.05, 0.3)), seed_of(rng))
-    things = [
-        Thing("station", station, standing, STATION, surface),
-        Thing("inspector", craft, poses, INSPECTOR, surface),
+    surface = Surface("grain", 0.4, float(rng.uniform(0.05, 0.3)), random_seed(rng))
+    bodies = [
+        RigidBody("station", station, standing, STATION, surface),
+        RigidBody("inspector", craft, poses, INSPECTOR, surface),
         *_surroundings(rng, radius),
     ]
     script = Script(
-        things,
+        bodies,
         view,
         ("inspect_gap", TASK.format(range=wording.format(limit), hold=HOLD_S)),
         ("inspector", "station"),
         truth,
         frames,
     )
-    return finished(rng, "inspect", script)
+    return complete_world(rng, "inspect", script)
 
 
 def _station(rng: np.random.Generator) -> tuple[Solid, float]:
@@ -132,23 +146,23 @@ def _station(rng: np.random.Generator) -> tuple[Solid, float]:
     )
     if rng.random() < 0.7:
         statue = statue.painted(stone)
-    r = float(np.linalg.norm(statue.vertices[:, :2], axis=1).max()) * 0.75
-    pedestal = cone((0, 0, 0), (0, 0, foot), r, None, pick_colour(rng, vivid=False))
+    pedestal_radius = float(np.linalg.norm(statue.vertices[:, :2], axis=1).max()) * 0.75
+    pedestal = cone((0, 0, 0), (0, 0, foot), pedestal_radius, None, pick_colour(rng, vivid=False))
     return join(statue, pedestal), foot + size * float(high[2] - low[2])
 
 
 def _tower(rng: np.random.Generator, colour: Colour) -> tuple[Solid, float]:
-    high, r = float(rng.uniform(1.4, 2.2)), float(rng.uniform(0.35, 0.6))
+    height, radius = float(rng.uniform(1.4, 2.2)), float(rng.uniform(0.35, 0.6))
     top = pick_colour(rng)
     if rng.random() < 0.5:
         return join(
-            cone((0, 0, 0), (0, 0, high), r, 0.7 * r, colour),
-            cone((0, 0, high), (0, 0, high + 0.4), 0.9 * r, 0.0, top),
-        ), high + 0.4
+            cone((0, 0, 0), (0, 0, height), radius, 0.7 * radius, colour),
+            cone((0, 0, height), (0, 0, height + 0.4), 0.9 * radius, 0.0, top),
+        ), height + 0.4
     return join(
-        box((1.6 * r, 1.6 * r, high), (0, 0, high / 2), colour),
-        box((2 * r, 2 * r, 0.2), (0, 0, high + 0.1), top),
-    ), high + 0.2
+        box((1.6 * radius, 1.6 * radius, height), (0, 0, height / 2), colour),
+        box((2 * radius, 2 * radius, 0.2), (0, 0, height + 0.1), top),
+    ), height + 0.2
 
 
 def _craft(
@@ -171,15 +185,20 @@ def _times(rng: np.random.Generator, outcome: str) -> InspectTimes:
 
 
 def _view(
-    rng: np.random.Generator, sizes: tuple[float, float], least_deg: float, frames: int
+    rng: np.random.Generator, sizes: tuple[float, float], min_elevation_deg: float, frames: int
 ) -> Viewpoint:
     """From high up, so that the circle is visible; no zoom, since the task measures in pixels."""
     radius, height = sizes
-    high, side = np.radians(rng.uniform(least_deg, 88)), rng.uniform(0, 2 * np.pi)
-    far = 3.6 * (radius + 0.5)
+    elevation, side = np.radians(rng.uniform(min_elevation_deg, 88)), rng.uniform(0, 2 * np.pi)
+    distance = 3.6 * (radius + 0.5)
     aim = np.array([0.0, 0.0, 0.3 * height])
-    view = steady(aim + far * bearing(side, high), aim, float(rng.uniform(38, 44)), frames)
-    return disturbed(view, rng, str(rng.choice(["fixed", "fixed", "shaking", "panning"])))
+    view = fixed_camera(
+        aim + distance * direction_from_angles(side, elevation),
+        aim,
+        float(rng.uniform(38, 44)),
+        frames,
+    )
+    return with_camera_motion(view, rng, str(rng.choice(["fixed", "fixed", "shaking", "panning"])))
 
 
 def _flight(
@@ -191,7 +210,7 @@ def _flight(
     frames: int,
 ) -> tuple[Poses, float]:
     """(F, 4, 4) of the inspector, and when it hits the station (past the end if it does not), seconds."""
-    t = clock(frames)
+    t = frame_times(frames)
     (station, craft), (radius, level) = solids, circle
     first, turn = rng.uniform(0, 2 * np.pi), rng.choice([-1, 1]) * rng.uniform(0.45, 0.7)
     moving = np.clip(t, times.arrive - 0.8, times.leave + (0.0 if outcome == "touch" else 0.8))
@@ -205,9 +224,9 @@ def _flight(
     distance = eased(t, keys)
     bob = 0.03 * np.sin(2 * np.pi * t / 1.7) if level else np.zeros(frames)
     at = np.column_stack([distance * np.cos(angle), distance * np.sin(angle), level + bob])
-    way = np.gradient(at[:, :2], axis=0)
-    heading = np.unwrap(np.arctan2(way[:, 1], way[:, 0])) if not level else angle + np.pi
-    poses = posed(at, heading)
+    step = np.gradient(at[:, :2], axis=0)
+    heading = np.unwrap(np.arctan2(step[:, 1], step[:, 0])) if not level else angle + np.pi
+    poses = make_poses(at, heading)
     if outcome != "touch":
         return poses, times.end + 1
     return _stopped(poses, _first_hit(station, craft, poses), level)
@@ -215,8 +234,8 @@ def _flight(
 
 def _first_hit(station: Solid, craft: Solid, poses: Poses) -> int:
     """The first frame in which the craft is within 4 cm of the station."""
-    tree = cKDTree(_scattered_over(station, 20_000))
-    own = _scattered_over(craft, 500)
+    tree = cKDTree(_sample_surface(station, 20_000))
+    own = _sample_surface(craft, 500)
     for index, pose in enumerate(poses):
         points = own @ pose[:3, :3].T + pose[:3, 3]
         if tree.query(points)[0].min() < 0.04:
@@ -224,7 +243,7 @@ def _first_hit(station: Solid, craft: Solid, poses: Poses) -> int:
     return len(poses) - 1
 
 
-def _scattered_over(solid: Solid, count: int) -> Doubles:
+def _sample_surface(solid: Solid, count: int) -> Doubles:
     """(count, 3) points spread evenly over the faces of a solid."""
     rng = np.random.default_rng(0)
     corners = solid.vertices[solid.faces]
@@ -246,18 +265,18 @@ def _stopped(poses: Poses, hit: int, level: float) -> tuple[Poses, float]:
 
 def _gaps(view: Viewpoint, station: Solid, standing: Poses, craft: Solid, poses: Poses) -> Doubles:
     """(F,) approximate distance between their outlines, pixels, for the camera without shake."""
-    still_points = projected(view, _scattered_over(station, 600) @ standing[0, :3, :3].T, SIZE)
-    own = _scattered_over(craft, 200)
+    still_points = project(view, _sample_surface(station, 600) @ standing[0, :3, :3].T, SIZE)
+    own = _sample_surface(craft, 200)
     found = []
     for pose in poses:
-        points = projected(view, own @ pose[:3, :3].T + pose[:3, 3], SIZE)
+        points = project(view, own @ pose[:3, :3].T + pose[:3, 3], SIZE)
         found.append(cdist(points, still_points).min())
     return np.array(found)
 
 
-def _course(times: InspectTimes, outcome: str, gaps: Doubles, hit_s: float) -> tuple[Course, int]:
+def _truth(times: InspectTimes, outcome: str, gaps: Doubles, hit_s: float) -> tuple[TaskTruth, int]:
     """Ground truth, and the range in pixels that its user chose."""
-    t = clock(len(gaps))
+    t = frame_times(len(gaps))
     round_about = (t >= times.arrive) & (t <= times.leave)
     limit = int(np.ceil(gaps[round_about].max() * 1.12 / 10) * 10)
     near = gaps < limit
@@ -266,24 +285,24 @@ def _course(times: InspectTimes, outcome: str, gaps: Doubles, hit_s: float) -> t
     moves = (Motion("inspector", times.begin, times.end),)
     approach = ("approach", times.begin, begin)
     if outcome == "touch":
-        stages = spans(approach, ("fly_around", begin, hit_s, "unsafe"))
+        stages = stage_spans(approach, ("fly_around", begin, hit_s, "unsafe"))
         touch = (Contact("inspector", "station", hit_s, times.end),)
         alerts = {"never touching": hit_s}
-        return Course(outcome, "interrupted", stages, (), touch, moves, alerts), limit
+        return TaskTruth(outcome, "interrupted", stages, (), touch, moves, alerts), limit
     if outcome == "leave":
-        stages = spans(approach, ("fly_around", begin, over, "failing"))
-        return Course(outcome, "failed", stages, (), (), moves), limit
-    stages = spans(
+        stages = stage_spans(approach, ("fly_around", begin, over, "failing"))
+        return TaskTruth(outcome, "failed", stages, (), (), moves), limit
+    stages = stage_spans(
         approach, ("fly_around", begin, times.leave), ("retreat", times.leave, times.end)
     )
-    return Course(outcome, "succeeded", stages, (), (), moves), limit
+    return TaskTruth(outcome, "succeeded", stages, (), (), moves), limit
 
 
-def _surroundings(rng: np.random.Generator, radius: float) -> list[Thing]:
+def _surroundings(rng: np.random.Generator, radius: float) -> list[RigidBody]:
     indoors = rng.random() < 0.3
     found = list(hall(rng, radius * 3.5) if indoors else meadow(rng))
     side = 2.6 * radius
-    free = [(0.0, 0.0, 1.8 * radius)]
+    corridors = [(0.0, 0.0, 1.8 * radius)]
     return found + clutter.scattered(
-        rng, int(rng.integers(0, 6)), 0.2, (-side, side, -side, side), free
+        rng, int(rng.integers(0, 6)), 0.2, (-side, side, -side, side), corridors
     )

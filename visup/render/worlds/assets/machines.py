@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from visup.render.meshes.solids import Colour, Solid, ball, box, cone, join
-from visup.render.worlds.things.scenery import pick_colour
+from visup.render.worlds.assets.scenery import pick_colour
 
 BLACK: Colour = (0.07, 0.07, 0.08)
 STEEL: Colour = (0.6, 0.6, 0.62)
@@ -33,69 +33,77 @@ def wheels(length: float, width: float, radius: float) -> Solid:
 def vehicle(rng: np.random.Generator, colour: Colour) -> tuple[Solid, float]:
     """A vehicle and its length; its nose is flat, at half its length."""
     length = float(rng.uniform(0.85, 1.25))
-    width, high = length * float(rng.uniform(0.5, 0.65)), length * float(rng.uniform(0.28, 0.42))
-    r = 0.13 * length
+    width, height = length * float(rng.uniform(0.5, 0.65)), length * float(rng.uniform(0.28, 0.42))
+    wheel_radius = 0.13 * length
     second = pick_colour(rng, bool(rng.random() < 0.5))
     style = rng.integers(4)
-    body = box((length, width, high - r * 0.7), (0, 0, (high + r * 0.7) / 2), colour)
+    body = box(
+        (length, width, height - wheel_radius * 0.7),
+        (0, 0, (height + wheel_radius * 0.7) / 2),
+        colour,
+    )
     if style == 0:
         extra = [
-            box((0.45 * length, 0.8 * width, 0.22), (-0.12 * length, 0, high + 0.11), second),
+            box((0.45 * length, 0.8 * width, 0.22), (-0.12 * length, 0, height + 0.11), second),
             cone(
-                (-0.35 * length, 0.2 * width, high),
-                (-0.35 * length, 0.2 * width, high + 0.45),
+                (-0.35 * length, 0.2 * width, height),
+                (-0.35 * length, 0.2 * width, height + 0.45),
                 0.02,
                 None,
                 STEEL,
             ),
-            box((0.12, 0.16, 0.1), (0.3 * length, 0, high + 0.05), BLACK),
+            box((0.12, 0.16, 0.1), (0.3 * length, 0, height + 0.05), BLACK),
         ]
     elif style == 1:
         extra = [
-            box((0.9 * length, 1.04 * width, 0.05), (0, 0, high * 0.7), BLACK),
-            cone((0.25 * length, 0, high), (0.25 * length, 0, high + 0.12), 0.09, None, BLACK),
-            box((0.5 * length, 0.9 * width, 0.03), (-0.1 * length, 0, high + 0.015), second),
+            box((0.9 * length, 1.04 * width, 0.05), (0, 0, height * 0.7), BLACK),
+            cone((0.25 * length, 0, height), (0.25 * length, 0, height + 0.12), 0.09, None, BLACK),
+            box((0.5 * length, 0.9 * width, 0.03), (-0.1 * length, 0, height + 0.015), second),
         ]
     elif style == 2:
         extra = [
-            box((0.5 * length, 0.9 * width, 0.28), (-0.08 * length, 0, high + 0.12), GLASS),
-            box((0.46 * length, 0.92 * width, 0.04), (-0.08 * length, 0, high + 0.28), colour),
+            box((0.5 * length, 0.9 * width, 0.28), (-0.08 * length, 0, height + 0.12), GLASS),
+            box((0.46 * length, 0.92 * width, 0.04), (-0.08 * length, 0, height + 0.28), colour),
         ]
     else:
         extra = [
-            box((0.06, 0.1 * width, 0.7), (0.36 * length, 0.3 * width, high + 0.3), STEEL),
-            box((0.06, 0.1 * width, 0.7), (0.36 * length, -0.3 * width, high + 0.3), STEEL),
-            box((0.3 * length, 0.7 * width, 0.3), (-0.3 * length, 0, high + 0.15), second),
+            box((0.06, 0.1 * width, 0.7), (0.36 * length, 0.3 * width, height + 0.3), STEEL),
+            box((0.06, 0.1 * width, 0.7), (0.36 * length, -0.3 * width, height + 0.3), STEEL),
+            box((0.3 * length, 0.7 * width, 0.3), (-0.3 * length, 0, height + 0.15), second),
             cone(
-                (-0.3 * length, 0, high + 0.3),
-                (-0.3 * length, 0, high + 0.42),
+                (-0.3 * length, 0, height + 0.3),
+                (-0.3 * length, 0, height + 0.42),
                 0.06,
                 None,
                 (0.9, 0.5, 0.1),
             ),
         ]
-    return join(body, wheels(length, width, r), *extra), length
+    return join(body, wheels(length, width, wheel_radius), *extra), length
 
 
 def charger(rng: np.random.Generator, colour: Colour) -> tuple[Solid, float]:
     """A charging post, and the distance of its front from its origin, towards +x."""
-    deep, wide = float(rng.uniform(0.12, 0.22)), float(rng.uniform(0.3, 0.6))
-    high = float(rng.uniform(0.7, 1.3))
+    depth, width = float(rng.uniform(0.12, 0.22)), float(rng.uniform(0.3, 0.6))
+    height = float(rng.uniform(0.7, 1.3))
     second = pick_colour(rng, bool(rng.random() < 0.5))
-    foot = box((2 * deep, wide * 1.1, 0.05), (0, 0, 0.025), second)
+    foot = box((2 * depth, width * 1.1, 0.05), (0, 0, 0.025), second)
     style = rng.integers(4)
     if style == 0:
-        top = box((0.6 * deep, wide * 0.5, 0.25), (0, 0, high + 0.1), second)
-        return join(foot, box((1.4 * deep, wide * 0.7, high), (0, 0, high / 2), colour), top), deep
+        top = box((0.6 * depth, width * 0.5, 0.25), (0, 0, height + 0.1), second)
+        return join(
+            foot, box((1.4 * depth, width * 0.7, height), (0, 0, height / 2), colour), top
+        ), depth
     if style == 1:
-        disc = cone((0, 0, high), (0, 0, high + 0.16), wide * 0.45, None, second)
-        return join(foot, cone((0, 0, 0), (0, 0, high), deep * 0.8, None, colour), disc), deep
+        disc = cone((0, 0, height), (0, 0, height + 0.16), width * 0.45, None, second)
+        return join(foot, cone((0, 0, 0), (0, 0, height), depth * 0.8, None, colour), disc), depth
     if style == 2:
-        panel = box((0.02, wide * 0.7, 0.3), (deep * 0.95, 0, high * 0.7), GLASS)
-        return join(foot, box((1.9 * deep, wide, high), (0, 0, high / 2), colour), panel), deep
-    low = box((2 * deep, wide, 0.35), (0, 0, 0.175), colour)
-    pole = cone((-0.5 * deep, 0, 0), (-0.5 * deep, 0, high + 0.4), 0.04, None, STEEL)
-    return join(foot, low, pole, ball(0.1, (-0.5 * deep, 0, high + 0.4), second, 2)), deep
+        panel = box((0.02, width * 0.7, 0.3), (depth * 0.95, 0, height * 0.7), GLASS)
+        return join(
+            foot, box((1.9 * depth, width, height), (0, 0, height / 2), colour), panel
+        ), depth
+    low = box((2 * depth, width, 0.35), (0, 0, 0.175), colour)
+    pole = cone((-0.5 * depth, 0, 0), (-0.5 * depth, 0, height + 0.4), 0.04, None, STEEL)
+    return join(foot, low, pole, ball(0.1, (-0.5 * depth, 0, height + 0.4), second, 2)), depth
 
 
 def drone(rng: np.random.Generator, colour: Colour, size: float) -> Solid:

@@ -1,4 +1,4 @@
-"""Small things, decoys that look like a part, people who walk past."""
+"""Small objects, decoys that look like a part, people who walk past."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from visup.render.meshes.solids import Colour, Solid, ball, box, cone, join, lathe
-from visup.render.worlds.motion import along, posed, still
-from visup.render.worlds.things.scenery import pick_colour, seed_of
-from visup.render.worlds.world import FPS, Surface, Thing
+from visup.render.worlds.assets.scenery import pick_colour, random_seed
+from visup.render.worlds.motion import make_poses, path_positions, static_pose
+from visup.render.worlds.world import FPS, RigidBody, Surface
 
 Doubles = NDArray[np.float64]
 
@@ -64,31 +64,35 @@ def scattered(
     count: int,
     size: float,
     area: tuple[float, float, float, float],
-    free_of: Sequence[tuple[float, float, float]],
-) -> list[Thing]:
-    """Small things at random places.
+    keep_free: Sequence[tuple[float, float, float]],
+) -> list[RigidBody]:
+    """Small objects at random places.
 
     Args:
         rng: Draws kinds, sizes, colours and places.
-        count: Largest number of things.
-        size: Half the size of an average thing, metres.
+        count: Largest number of objects.
+        size: Half the size of an average object, metres.
         area: x from, x to, y from, y to.
-        free_of: Discs (x, y, radius) to keep free.
+        keep_free: Discs (x, y, radius) to keep free.
     """
-    taken = list(free_of)
-    found: list[Thing] = []
+    occupied = list(keep_free)
+    found: list[RigidBody] = []
     for _ in range(count * 6):
         r = size * float(rng.uniform(0.6, 1.3))
         x, y = float(rng.uniform(*area[:2])), float(rng.uniform(*area[2:]))
         solid = SHAPES[rng.integers(len(SHAPES))](r, pick_colour(rng, bool(rng.random() < 0.6)))
-        if len(found) < count and all(np.hypot(x - a, y - b) > c + 1.5 * r for a, b, c in taken):
-            surface = Surface("grain", 3 * r, float(rng.uniform(0.05, 0.25)), seed_of(rng))
-            found.append(Thing("clutter", solid, still(x, y, 0, rng.uniform(0, 6.3)), 0, surface))
-            taken.append((x, y, 1.5 * r))
+        if len(found) < count and all(np.hypot(x - a, y - b) > c + 1.5 * r for a, b, c in occupied):
+            surface = Surface("grain", 3 * r, float(rng.uniform(0.05, 0.25)), random_seed(rng))
+            found.append(
+                RigidBody("clutter", solid, static_pose(x, y, 0, rng.uniform(0, 6.3)), 0, surface)
+            )
+            occupied.append((x, y, 1.5 * r))
     return found
 
 
-def corridor(start: ArrayLike, end: ArrayLike, width: float) -> list[tuple[float, float, float]]:
+def free_corridor(
+    start: ArrayLike, end: ArrayLike, width: float
+) -> list[tuple[float, float, float]]:
     """Discs (x, y, radius) that keep a straight path free."""
     a, b = np.asarray(start, float)[:2], np.asarray(end, float)[:2]
     steps = max(int(np.linalg.norm(b - a) / (width / 2)), 1)
@@ -99,28 +103,28 @@ def corridor(start: ArrayLike, end: ArrayLike, width: float) -> list[tuple[float
 def random_part(rng: np.random.Generator, half: float, colour: Colour) -> tuple[Solid, float]:
     """A part for a gripper, standing at z = 0, and its height, metres; `half` is half its width."""
     style = rng.integers(5)
-    tall = half * float(rng.uniform(1.4, 2.4))
+    height = half * float(rng.uniform(1.4, 2.4))
     if style == 0:
-        return box((2 * half, 2 * half, tall), (0, 0, tall / 2), colour), tall
+        return box((2 * half, 2 * half, height), (0, 0, height / 2), colour), height
     if style == 1:
-        return cone((0, 0, 0), (0, 0, tall), half, None, colour), tall
+        return cone((0, 0, 0), (0, 0, height), half, None, colour), height
     if style == 2:
-        low = box((2 * half, 2 * half, tall * 0.6), (0, 0, tall * 0.3), colour)
-        knob = cone((0, 0, tall * 0.6), (0, 0, tall), half * 0.6, None, colour)
-        return join(low, knob), tall
+        low = box((2 * half, 2 * half, height * 0.6), (0, 0, height * 0.3), colour)
+        knob = cone((0, 0, height * 0.6), (0, 0, height), half * 0.6, None, colour)
+        return join(low, knob), height
     if style == 3:
-        tall = 1.8 * half
+        height = 1.8 * half
         profile = [
             (0, 0),
             (0.75 * half, 0),
-            (half, tall),
-            (0.85 * half, tall),
-            (0.7 * half, 0.1 * tall),
-            (0, 0.1 * tall),
+            (half, height),
+            (0.85 * half, height),
+            (0.7 * half, 0.1 * height),
+            (0, 0.1 * height),
         ]
-        return lathe(profile, colour, 24), tall
-    sides = lathe([(0, 0), (half, 0), (half, tall), (0, tall)], colour, 6)
-    return sides, tall
+        return lathe(profile, colour, 24), height
+    sides = lathe([(0, 0), (half, 0), (half, height), (0, height)], colour, 6)
+    return sides, height
 
 
 def walker_solids(rng: np.random.Generator) -> tuple[Solid, Solid, Solid]:
@@ -140,39 +144,39 @@ def walker_solids(rng: np.random.Generator) -> tuple[Solid, Solid, Solid]:
     return trunk, leg, leg
 
 
-def walking(
-    rng: np.random.Generator, way: Doubles, heading: Doubles, name: str, label: int
-) -> list[Thing]:
+def walking_person(
+    rng: np.random.Generator, positions: Doubles, heading: Doubles, name: str, label: int
+) -> list[RigidBody]:
     """A person who walks: trunk and swinging legs.
 
     Args:
         rng: Draws clothes.
-        way: (F, 2) path, metres.
+        positions: (F, 2) path, metres.
         heading: (F,) radians.
         name: Name of the person.
         label: Label in masks.
     """
     trunk, left, right = walker_solids(rng)
-    steps = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))])
+    steps = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(positions, axis=0), axis=1))])
     speed = np.gradient(steps) * FPS
     swing = 0.5 * np.clip(speed / 1.2, 0, 1) * np.sin(2 * np.pi * steps / 1.3)
-    ground = np.column_stack([way, 0.02 * np.abs(np.sin(2 * np.pi * steps / 1.3))])
+    ground = np.column_stack([positions, 0.02 * np.abs(np.sin(2 * np.pi * steps / 1.3))])
     side = np.column_stack([-np.sin(heading), np.cos(heading), np.zeros(len(heading))])
     hip = ground + np.array([0, 0, 0.88])
-    surface = Surface("grain", 0.3, 0.15, seed_of(rng))
+    surface = Surface("grain", 0.3, 0.15, random_seed(rng))
     return [
-        Thing(name, trunk, posed(ground, heading), label, surface),
-        Thing(name, left, posed(hip + 0.1 * side, heading, swing), label, surface),
-        Thing(name, right, posed(hip - 0.1 * side, heading, -swing), label, surface),
+        RigidBody(name, trunk, make_poses(ground, heading), label, surface),
+        RigidBody(name, left, make_poses(hip + 0.1 * side, heading, swing), label, surface),
+        RigidBody(name, right, make_poses(hip - 0.1 * side, heading, -swing), label, surface),
     ]
 
 
 def passer_by(
     rng: np.random.Generator, frames: int, start: Sequence[float], end: Sequence[float], label: int
-) -> list[Thing]:
+) -> list[RigidBody]:
     """A person who walks from one point (x, y) to another, without a role in the task."""
     begin, last = sorted(rng.uniform(-0.2, 1.2, 2))
     share = (np.linspace(0, 1, frames) - begin) / max(last - begin, 0.35)
     line = np.array([start, end], float)
-    at, heading = along(line, np.clip(share, 0, 1))
-    return walking(rng, at, np.broadcast_to(heading, len(at)), "bystander", label)
+    at, heading = path_positions(line, np.clip(share, 0, 1))
+    return walking_person(rng, at, np.broadcast_to(heading, len(at)), "bystander", label)

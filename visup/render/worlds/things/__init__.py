@@ -1,5 +1,0 @@
-"""Contents of random worlds: surroundings, light, machines, robot arms, clutter.
-
-`scenery.py` makes the surroundings, `machines.py` and `robot.py` the machines, `clutter.py` small things and
-passers-by.
-"""
