@@ -76,9 +76,8 @@ def with_unexpected_object(
         track=track,
         spin=(spin,),
     )
-    return unexpected, _truth_with_object(
-        script.truth, appears_s, approach.end_s, collides=collides
-    )
+    truth = _truth_with_object(script.truth, appears_s, approach.end_s, collides=collides)
+    return unexpected, truth
 
 
 def _truth_with_object(

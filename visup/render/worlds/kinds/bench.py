@@ -229,10 +229,8 @@ def _tip_trajectory(
     ]
     keys.append((keys[-1][0] + 1.6, home))
     at = frame_times(frames)
-    zero = np.zeros(frames)
-    return TipTrajectory(
-        eased(at, keys), eased(at, fingers), zero + float(rng.uniform(-0.4, 0.4)), zero
-    )
+    roll = np.full(frames, float(rng.uniform(-0.4, 0.4)))
+    return TipTrajectory(eased(at, keys), eased(at, fingers), roll, np.zeros(frames))
 
 
 def _parts(

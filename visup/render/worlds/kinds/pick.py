@@ -156,9 +156,8 @@ def tip_trajectory(
     aside = layout.part.copy()
     if outcome == "miss":
         angle = rng.uniform(0, 2 * np.pi)
-        aside += (
-            layout.half_width * rng.uniform(3.0, 4.0) * np.array([np.cos(angle), np.sin(angle)])
-        )
+        direction = np.array([np.cos(angle), np.sin(angle)])
+        aside += layout.half_width * rng.uniform(3.0, 4.0) * direction
     goal = layout.astray if outcome == "wrong_place" else layout.target
     low = grip if outcome == "wrong_place" else grip + layout.floor_height
     t = times
@@ -184,13 +183,9 @@ def tip_trajectory(
         (t.end, layout.home),
     ]
     at = frame_times(frames)
-    zero = np.zeros(frames)
-    return TipTrajectory(
-        eased(at, keys),
-        _opening(layout, times, outcome, frames),
-        zero + rng.uniform(-0.5, 0.5),
-        zero,
-    )
+    opening = _opening(layout, times, outcome, frames)
+    roll = np.full(frames, rng.uniform(-0.5, 0.5))
+    return TipTrajectory(eased(at, keys), opening, roll, np.zeros(frames))
 
 
 def part_poses(
