@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from visup.agent.model.did_you_mean import closest, did_you_mean
+from visup.agent.model.did_you_mean import closest
 from visup.rules.formula.nodes import Comparison, Predicate
 from visup.rules.formula.terms import Measure
 from visup.rules.language.diagnostics import listed, nearest
 from visup.rules.language.dimensions import example_amount
-from visup.rules.language.synonyms import negated_synonym, synonym
+from visup.rules.language.synonyms import meant_word, negated_synonym
 from visup.rules.language.transform import Fault
 from visup.rules.predicates.arguments import (
     EXAMPLES,
@@ -60,15 +60,16 @@ def _unknown(call: Call, vocabulary: Vocabulary, scope: tuple[str, ...]) -> Faul
     fact = isinstance(call, Predicate)
     table = predicates if fact else quantities
     kind = "relation or fact" if fact else "quantity"
-    hint = did_you_mean(synonym(call.name, table) or call.name, table)
+    meant = meant_word(call.name, table)
+    hint = f"did you mean '{meant}'?" if meant else None
     if fact and call.name in _KNOWN and len(call.arguments) == 1:
-        meant = "identified" if call.arguments[0] in scope else "signal_known"
-        hint = f"write `{meant}({call.arguments[0]})`"
+        fact_known = "identified" if call.arguments[0] in scope else "signal_known"
+        hint = f"write `{fact_known}({call.arguments[0]})`"
     elif fact and (other := negated_synonym(call.name, call.arguments, predicates)) is not None:
         hint = f"write `{other}`"
     elif call.name in (quantities if fact else predicates):
         hint = _comparison_hint(call, vocabulary) if fact else "it is true or false"
-    elif not fact and hint is not None and "'objects'" in hint and len(call.arguments) == 1:
+    elif not fact and meant == "objects" and len(call.arguments) == 1:
         hint = f"write `objects_named({call.arguments[0]})`"
     elif call.name in scope and not call.arguments:
         hint = f"write `seen({call.name})` in place of `{call.name}`"

@@ -12,7 +12,7 @@ from math import degrees
 from visup.agent.model.did_you_mean import closest
 from visup.rules.correction.everyday_phrases import AMOUNT_SAID, amount_said
 from visup.rules.language.keywords import KEYWORDS
-from visup.rules.language.synonyms import synonym
+from visup.rules.language.synonyms import meant_word, synonym
 from visup.rules.predicates.vocabulary import RULES
 
 
@@ -123,7 +123,7 @@ def _behind(match: re.Match[str]) -> str:
 
 def _pronoun(match: re.Match[str]) -> str:
     """What somebody or nobody does with an object."""
-    verb = synonym(match["verb"], RULES.predicates) or closest(match["verb"], RULES.predicates)
+    verb = meant_word(match["verb"], RULES.predicates)
     said = f"(exists other: {verb}(other, {match['what']}))"
     return f"not {said}" if match["who"].casefold().startswith("no") else said
 

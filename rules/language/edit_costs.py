@@ -17,7 +17,7 @@ from visup.rules.correction.repair_search import EditCosts, Replacement
 from visup.rules.correction.tokens import Word, terminals_of
 from visup.rules.formula.units import UNITS_MEANT, Unit
 from visup.rules.language.keywords import FUNCTIONS, KEYWORDS
-from visup.rules.language.synonyms import synonym
+from visup.rules.language.synonyms import MISSPELLING, meant_word, synonym
 from visup.rules.predicates.vocabulary import RULES
 
 SURE, LIKELY, GUESS = 0.1, 0.3, 0.6
@@ -215,7 +215,9 @@ _WHEN = frozenset(("when", "if", "whenever", "wenn", "si", "quand", "wen", "whn"
 def _verb(word: str, things: int) -> str | None:
     """The relation between this many objects meant by a word."""
     known = _RELATIONS[things - 1]
-    return word if word in known else synonym(word, known) or closest(word, known, 0.8)
+    if word in known:
+        return word
+    return closest(word, known, MISSPELLING) or synonym(word, known)
 
 
 _ARGUMENT_KINDS = {name: word.argument_kinds for name, word in RULES.predicates.items()} | {
@@ -260,7 +262,7 @@ def _meanings(words: Sequence[Word], at: int) -> Iterator[Replacement]:
     elif not called and first not in _VOCABULARY and (near := closest(first, KEYWORDS, 0.7)):
         yield Replacement(1, (_terminal(near),), near, GUESS)
     if called and first not in _VOCABULARY:
-        named = synonym(first, _VOCABULARY) or closest(first, _VOCABULARY)
+        named = meant_word(first, _VOCABULARY)
         if named is not None:
             yield Replacement(1, ("NAME",), named, LIKELY)
 

@@ -7,6 +7,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from types import MappingProxyType
 
+from visup.agent.model.did_you_mean import closest
+
+MISSPELLING = 0.8
+"""Similarity from which an unknown word is a misspelling of a known one, whatever its parts mean."""
+
 _MEANT = (
     ("touching coupled", "touch contact collide collision hit bump crash meet push insert strike"),
     ("coupled", "couple attach connect join grasp grab grip pick lift carry take hold dock fasten"),
@@ -82,6 +87,22 @@ def synonym(name: str, known: Iterable[str]) -> str | None:
         if meant is not None:
             return meant
     return None
+
+
+def meant_word(name: str, known: Iterable[str]) -> str | None:
+    """The known word meant by an unknown one: the same misspelt, else a synonym, else the closest.
+
+    >>> meant_word("near_moving_actr", ["near_moving_actor", "converging"])
+    'near_moving_actor'
+    >>> meant_word("near_it", ["near_moving_actor", "converging"])
+    'converging'
+
+    Args:
+        name: The written name.
+        known: The known words.
+    """
+    words = tuple(known)
+    return closest(name, words, MISSPELLING) or synonym(name, words) or closest(name, words)
 
 
 OF_TASKS: Mapping[str, str] = MappingProxyType(

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from types import MappingProxyType
 
-from visup.agent.model.did_you_mean import close_matches, closest
+from visup.agent.model.did_you_mean import close_matches
 from visup.agent.model.errors import SourceLocation
 from visup.rules.correction.automaton import LrAutomaton
 from visup.rules.correction.everyday_phrases import FILLERS, meanings_of
@@ -18,7 +18,7 @@ from visup.rules.correction.tokens import Terminals, Word, terminals_of
 from visup.rules.formula.units import UNITS_MEANT
 from visup.rules.language.diagnostics import Source
 from visup.rules.language.fixes import fix_of
-from visup.rules.language.synonyms import synonym
+from visup.rules.language.synonyms import meant_word, synonym
 from visup.tasks.actions.actions import ACTIONS, known_actions
 from visup.tasks.diagnostics.course_error_patterns import CONDITION_SYNONYMS
 from visup.tasks.diagnostics.normalise import normalise
@@ -277,7 +277,7 @@ class _Replacements:
             similar = close_matches(word.casefold(), KEYWORDS, n=3)
             yield from ((1, replacement, GUESS) for replacement in similar)
         if is_call and word not in known_actions():
-            named = synonym(word, ACTIONS) or closest(word, known_actions())
+            named = meant_word(word, known_actions())
             if named is not None:
                 yield 1, named, LIKELY
 

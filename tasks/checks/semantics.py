@@ -14,7 +14,7 @@ from functools import cached_property
 from visup.agent.model.did_you_mean import closest, did_you_mean
 from visup.rules.formula.units import Span
 from visup.rules.language.diagnostics import Diagnostic, Source
-from visup.rules.language.synonyms import synonym
+from visup.rules.language.synonyms import meant_word
 from visup.tasks.actions.actions import ACTIONS, ActionDefinition
 from visup.tasks.checks.ambiguity import AmbiguityCheck
 from visup.tasks.checks.bounds import BoundsCheck
@@ -176,8 +176,7 @@ class _Semantics:
             if name in self.actions or name in reported:
                 continue
             reported.add(name)
-            suggestion = closest(name, self.actions, 0.8) or synonym(name, self.actions)
-            suggestion = suggestion or closest(name, self.actions)
+            suggestion = meant_word(name, self.actions)
             expected = f"an action: {', '.join(sorted(ACTIONS))}, or a word of rules"
             width = replace(span, end_line=span.line, end_column=span.column + len(name))
             at = span if self.is_head(span) else width

@@ -174,6 +174,10 @@ def test_taking_up_the_hints_makes_a_mistaken_rule_legal(text: str) -> None:
         ("signal(mode) == auto and seen(a)", "signal_is(mode, auto) and seen(a)"),
         ("a == arm and seen(b)", "named(a, arm) and seen(b)"),
         ("is_person(a) and seen(b)", "named(a, person) and seen(b)"),
+        (
+            "near_moving_actr(a) and seen(b)",
+            "near_moving_actor(a) and seen(b)",
+        ),  # not a synonym of near
         ("outside(a, bay) and seen(b)", "not reaching(a, bay) and seen(b)"),
         ("expected(touching(a, b))", "expected(touching, a, b)"),
         ("nobody touches a and seen(b)", "not (exists other: touching(other, a)) and seen(b)"),
