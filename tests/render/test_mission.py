@@ -13,7 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from visup.agent.model.errors import ExtraMissingError, OutputError, SettingsError
-from visup.commands.render import needs_renderer, parse_size
+from visup.commands.render import parse_size, require_renderer
 from visup.render.imaging.renderer import Renderer
 from visup.render.output.truth import presence_events, spin_deg_per_s
 from visup.render.output.writer import write_mission
@@ -157,4 +157,4 @@ def test_without_the_extra_the_command_names_it(
 ) -> None:
     monkeypatch.setitem(sys.modules, "embreex", None)
     with pytest.raises(ExtraMissingError, match="'render'"):
-        needs_renderer()
+        require_renderer()

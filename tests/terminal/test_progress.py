@@ -7,14 +7,14 @@ from io import StringIO
 import pytest
 from rich.console import Console
 
-from visup.commands.watch import LAG_SHOWN_S, pace_text, progress_bar
+from visup.commands.watch import MIN_SHOWN_LAG_S, pace_text, progress_bar
 
 
 @pytest.mark.parametrize(
     ("done", "took_s", "lag_s", "told"),
     [
         (50, 2.0, None, "25.0 frames/s"),
-        (50, 2.0, LAG_SHOWN_S / 2, "25.0 frames/s"),
+        (50, 2.0, MIN_SHOWN_LAG_S / 2, "25.0 frames/s"),
         (50, 2.0, 12.34, "25.0 frames/s, 12.3 s behind"),
         (1, 0.5, None, ""),  # too early to tell
     ],

@@ -56,22 +56,22 @@ def html_with_picture(text: RenderableType, step: Step | None) -> str:
 
 def rows(title: str, records: Iterable[Any]) -> RenderableType:
     """The first of some records as a table, as wide as the terminal."""
-    several = list(islice(records, MAX_ROWS + 1))
+    first_records = list(islice(records, MAX_ROWS + 1))
     table = Table(title=title, title_justify="left", box=None, header_style="dim")
-    names = _names(several[0]) if several else ()
+    names = _field_names(first_records[0]) if first_records else ()
     for name in names:
         table.add_column(name, no_wrap=name != "text", overflow="ellipsis")
-    for record in several[:MAX_ROWS]:
+    for record in first_records[:MAX_ROWS]:
         table.add_row(*(_short_text(getattr(record, name)) for name in names))
-    return Group(table, *([Text("...")] if len(several) > MAX_ROWS else []))
+    return Group(table, *([Text("...")] if len(first_records) > MAX_ROWS else []))
 
 
-def _names(record: Any) -> tuple[str, ...]:
+def _field_names(record: Any) -> tuple[str, ...]:
     return tuple(f.name for f in fields(record))[:8] if is_dataclass(record) else ()
 
 
 def _short_text(value: object) -> Text:
     if isinstance(value, float):
         return Text(f"{value:.6g}")
-    shown = value if isinstance(value, str | int | tuple) or value is None else type(value).__name__
-    return Text(str(shown))
+    text = value if isinstance(value, str | int | tuple) or value is None else type(value).__name__
+    return Text(str(text))

@@ -1,4 +1,4 @@
-"""Recorded objects in the forms of other tools: MOT, COCO, FiftyOne, CSV."""
+"""Recorded objects in the formats of other tools: MOT, COCO, FiftyOne, CSV."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ def export(
 
     Args:
         run: A run, or its folder.
-        form: `mot` (MOT Challenge: a line a box, frames from 1), `coco` (COCO JSON with `track_id`),
+        form: `mot` (MOT Challenge: one line per box, frames from 1), `coco` (COCO JSON with `track_id`),
             `fiftyone` (labels of a video for FiftyOne: boxes as shares of the picture, frames from 1) or
-            `csv` (all that is believed, also of hidden objects and passing impressions).
+            `csv` (all beliefs, also about hidden and unconfirmed objects).
         target: The file.
 
     Returns:
-        How many boxes of objects in view were written: of one run the same in each form.
+        Number of boxes of objects in view; the same for every form.
 
     Raises:
         SettingsError: There is no such form.
@@ -56,14 +56,14 @@ def export(
     text, count = FORMS[form](recorded)
     try:
         write_atomically(Path(target), text.encode("utf-8"))
-    except OSError as fault:
-        what = f"the file cannot be written ({fault.strerror})"
-        raise OutputError(what, where=str(target)) from fault
+    except OSError as error:
+        what = f"the file cannot be written ({error.strerror})"
+        raise OutputError(what, where=str(target)) from error
     return count
 
 
-def _seen(run: RecordedRun) -> Iterator[RecordedObject]:
-    """Objects in view that are more than a passing impression."""
+def _objects_in_view(run: RecordedRun) -> Iterator[RecordedObject]:
+    """Confirmed objects in view."""
     return filter(_in_view, run.objects)
 
 
@@ -74,7 +74,7 @@ def _in_view(o: RecordedObject) -> bool:
 def _mot(run: RecordedRun) -> tuple[str, int]:
     lines = [
         f"{o.frame_index + 1},{o.id},{','.join(map(str, o.bbox))},{o.share or 1.0:.3f},-1,-1,-1"
-        for o in _seen(run)
+        for o in _objects_in_view(run)
     ]
     return "".join(f"{line}\n" for line in lines), len(lines)
 
@@ -82,8 +82,8 @@ def _mot(run: RecordedRun) -> tuple[str, int]:
 def _coco(run: RecordedRun) -> tuple[str, int]:
     width, height = run.facts.get("size") or (0, 0)
     source = str(run.facts.get("source", ""))
-    seen = list(_seen(run))
-    names = {name: n for n, name in enumerate(sorted({o.name for o in seen}), start=1)}
+    objects = list(_objects_in_view(run))
+    names = {name: n for n, name in enumerate(sorted({o.name for o in objects}), start=1)}
     images = [
         {
             "id": s.frame_index,
@@ -104,22 +104,22 @@ def _coco(run: RecordedRun) -> tuple[str, int]:
             "track_id": o.id,
             "score": o.share or 1.0,
         }
-        for number, o in enumerate(seen, start=1)
+        for number, o in enumerate(objects, start=1)
     ]
-    made: dict[str, Any] = {
+    document: dict[str, Any] = {
         "info": {"description": f"visup run of {source}"},
         "images": images,
         "categories": [{"id": n, "name": name} for name, n in names.items()],
         "annotations": annotations,
     }
-    return json.dumps(made) + "\n", len(annotations)
+    return json.dumps(document) + "\n", len(annotations)
 
 
 def _fiftyone(run: RecordedRun) -> tuple[str, int]:
     width, height = run.facts.get("size") or (1, 1)
     frames: dict[str, dict[str, Any]] = {}
     count = 0
-    for o in _seen(run):
+    for o in _objects_in_view(run):
         count += 1
         number = o.frame_index + 1
         frame = frames.setdefault(str(number), {"frame_number": number, "objects": {"objects": []}})
@@ -148,8 +148,8 @@ def _csv(run: RecordedRun) -> tuple[str, int]:
     writer.writerow(COLUMNS)
     count = 0
     for o in run.objects:
-        believed = (o.name, o.share, o.presence, o.confirmed)
-        writer.writerow((o.frame_index, o.time, o.id, *believed, *o.bbox, o.area))
+        beliefs = (o.name, o.share, o.presence, o.confirmed)
+        writer.writerow((o.frame_index, o.time, o.id, *beliefs, *o.bbox, o.area))
         count += _in_view(o)
     return out.getvalue(), count
 
@@ -157,4 +157,4 @@ def _csv(run: RecordedRun) -> tuple[str, int]:
 FORMS: Mapping[str, Callable[[RecordedRun], tuple[str, int]]] = MappingProxyType(
     {"mot": _mot, "coco": _coco, "fiftyone": _fiftyone, "csv": _csv}
 )
-"""Form -> what makes its text, and counts its boxes."""
+"""Form -> function of a run that returns the text of the file and its number of boxes."""

@@ -60,7 +60,7 @@ class RecordedObject:
         name: The likeliest model, or 'unknown object'.
         share: Share of the votes for it, 0 to 1.
         presence: 'seen', 'hidden' or 'left'.
-        confirmed: Whether it counts as an object, and not as a passing impression.
+        confirmed: Whether there is enough evidence that it is an object.
         region: Id of its region.
         bbox: (x, y, width, height), pixels.
         area: Pixels.
@@ -114,8 +114,8 @@ class RecordedRun:
     @property
     def verdict(self) -> Verdict | None:
         """The verdict; None if there was no task and nothing was wrong, or the run has not ended."""
-        said = self.facts.get("verdict")
-        return self._read(Verdict, said) if said is not None else None
+        value = self.facts.get("verdict")
+        return self._read(Verdict, value) if value is not None else None
 
     @cached_property
     def events(self) -> Records[Event]:
@@ -135,7 +135,7 @@ class RecordedRun:
     @cached_property
     def objects(self) -> Records[RecordedObject]:
         """The beliefs about each object after each step, one record per object and step."""
-        lines = ({**o, **_when(s)} for s in self.recording.summaries() for o in s["objects"])
+        lines = ({**o, **_timestamp(s)} for s in self.recording.summaries() for o in s["objects"])
         return self._records(RecordedObject, _object, lines)
 
     def __repr__(self) -> str:
@@ -152,16 +152,16 @@ class RecordedRun:
         return run_summary(str(self.folder), self.events, self.verdict, has_task=has_task)
 
     def _records(
-        self, kind: type[Record], made: Callable[[Any], Record], lines: Iterable[Any]
+        self, kind: type[Record], construct: Callable[[Any], Record], lines: Iterable[Any]
     ) -> Records[Record]:
-        return Records(kind, [self._read(made, line) for line in lines])
+        return Records(kind, [self._read(construct, line) for line in lines])
 
-    def _read(self, made: Callable[[Any], Record], line: Any) -> Record:
+    def _read(self, construct: Callable[[Any], Record], line: Any) -> Record:
         try:
-            return made(line)
-        except (KeyError, TypeError, ValueError, AttributeError, IndexError) as fault:
+            return construct(line)
+        except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
             where = str(self.recording.path)
-            raise OutputError(f"a record cannot be read ({fault})", where=where) from fault
+            raise OutputError(f"a record cannot be read ({error})", where=where) from error
 
 
 def open_run(folder: str | os.PathLike[str]) -> RecordedRun:
@@ -188,28 +188,28 @@ def open_run(folder: str | os.PathLike[str]) -> RecordedRun:
 
 
 def _event(line: Mapping[str, Any]) -> Event:
-    return Event(**_known(Event, line))
+    return Event(**_known_fields(Event, line))
 
 
 def _alert(line: Mapping[str, Any]) -> Alert:
-    return Alert(**_known(Alert, line))
+    return Alert(**_known_fields(Alert, line))
 
 
-def _known(kind: Any, line: Mapping[str, Any]) -> dict[str, Any]:
+def _known_fields(kind: Any, line: Mapping[str, Any]) -> dict[str, Any]:
     """The fields of a record from its line in the journal, lists as tuples."""
     names = {f.name for f in fields(kind)}
-    given = {k: tuple(v) if isinstance(v, list) else v for k, v in line.items() if k in names}
-    return {**given, "severity": Severity[line["severity"].upper()]}
+    values = {k: tuple(v) if isinstance(v, list) else v for k, v in line.items() if k in names}
+    return {**values, "severity": Severity[line["severity"].upper()]}
 
 
-def _when(summary: Mapping[str, Any]) -> dict[str, Any]:
+def _timestamp(summary: Mapping[str, Any]) -> dict[str, Any]:
     return {"frame_index": summary["frame_index"], "time": summary["time"]}
 
 
 def _step(summary: Mapping[str, Any]) -> RecordedStep:
     tasks = summary["tasks"]
     return RecordedStep(
-        **_when(summary),
+        **_timestamp(summary),
         objects=tuple(o["id"] for o in summary["objects"]),
         verdicts={t["task"]: t["verdict"] for t in tasks},
         stages={t["task"]: t["stages"] for t in tasks},
@@ -222,8 +222,8 @@ def _object(line: Mapping[str, Any]) -> RecordedObject:
     candidates = [(str(name), float(share)) for name, share in line["candidates"]]
     name, share = candidates[0] if candidates else (UNKNOWN_OBJECT, 0.0)
     lists = {"bbox": tuple(line["bbox"]), "velocity": tuple(line["velocity"])}
-    told = {**line, **lists, "name": name, "share": share, "candidates": dict(candidates)}
-    return RecordedObject(**told)
+    values = {**line, **lists, "name": name, "share": share, "candidates": dict(candidates)}
+    return RecordedObject(**values)
 
 
 enable_display(RecordedStep, RecordedObject)

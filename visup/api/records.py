@@ -42,12 +42,16 @@ class Records(Sequence[Record_co]):
         self._items = tuple(items)
 
     @overload
-    def __getitem__(self, at: int) -> Record_co: ...
+    def __getitem__(self, index: int) -> Record_co: ...
     @overload
-    def __getitem__(self, at: slice) -> Records[Record_co]: ...
-    def __getitem__(self, at: int | slice) -> Record_co | Records[Record_co]:
+    def __getitem__(self, index: slice) -> Records[Record_co]: ...
+    def __getitem__(self, index: int | slice) -> Record_co | Records[Record_co]:
         """One record, or some of them."""
-        return Records(self.kind, self._items[at]) if isinstance(at, slice) else self._items[at]
+        return (
+            Records(self.kind, self._items[index])
+            if isinstance(index, slice)
+            else self._items[index]
+        )
 
     def __len__(self) -> int:
         return len(self._items)
@@ -102,8 +106,8 @@ def columns(kind: type) -> Mapping[str, Column]:
         Name -> type of its values; fields that hold other records or arrays have none.
     """
     hints = get_type_hints(kind)
-    found = {f.name: _column(hints[f.name]) for f in fields(kind)}
-    return {name: column for name, column in found.items() if column is not None}
+    by_name = {f.name: _column(hints[f.name]) for f in fields(kind)}
+    return {name: column for name, column in by_name.items() if column is not None}
 
 
 def _column(hint: Any) -> Column | None:
@@ -120,20 +124,20 @@ def _column(hint: Any) -> Column | None:
 
 
 def _cell(value: Any, column: Column) -> Any:
-    told = to_jsonable(value)
-    if column == (Mapping,) and told is not None:
-        return json.dumps(told, ensure_ascii=False, sort_keys=True)
-    return value if column == (float,) else told
+    plain = to_jsonable(value)
+    if column == (Mapping,) and plain is not None:
+        return json.dumps(plain, ensure_ascii=False, sort_keys=True)
+    return value if column == (float,) else plain
 
 
 def _arrow_type(arrow: Any, column: Column) -> Any:
     names = {bool: "bool_", int: "int64", float: "float64", str: "string", Mapping: "string"}
-    one = getattr(arrow, names[column[-1]])()
-    return arrow.list_(one) if column[0] is tuple else one
+    element = getattr(arrow, names[column[-1]])()
+    return arrow.list_(element) if column[0] is tuple else element
 
 
 def _imported(library: str) -> Any:
     try:
         return import_module(library)
-    except ImportError as missing:
-        raise ExtraMissingError(f"a table for {library}", EXTRA) from missing
+    except ImportError as error:
+        raise ExtraMissingError(f"a table for {library}", EXTRA) from error

@@ -63,23 +63,23 @@ def settings_from(
     Raises:
         SettingsError: An argument has the wrong type or is out of range.
     """
-    given: dict[str, Any] = {**options}
-    _check_names(given)
-    given |= {
+    arguments: dict[str, Any] = {**options}
+    _check_names(arguments)
+    arguments |= {
         "source": _source(source),
         "tasks": _tasks(task),
         "models": _models(models),
         "actors": _actors(actors or {}),
     }
     try:
-        return TypeAdapter(WatchSettings).validate_python(given)
-    except ValidationError as fault:
-        raise _worded(fault) from fault
+        return TypeAdapter(WatchSettings).validate_python(arguments)
+    except ValidationError as error:
+        raise _settings_error(error) from error
 
 
-def _check_names(given: Mapping[str, Any]) -> None:
+def _check_names(arguments: Mapping[str, Any]) -> None:
     known = [f.name for f in fields(WatchSettings) if f.name in WatchOptions.__annotations__]
-    for name in given:
+    for name in arguments:
         if name not in known:
             raise SettingsError(
                 f"there is no setting called '{name}'", expected=f"one of: {', '.join(known)}"
@@ -123,9 +123,9 @@ def _task(task: object) -> str:
         return f"{task.file}:{task.name}"
     if isinstance(task, str | os.PathLike):
         return task if isinstance(task, str) else str(Path(task))
-    told = "a task made from text" if isinstance(task, Task) else repr(task)
+    description = "a task made from text" if isinstance(task, Task) else repr(task)
     raise SettingsError(
-        f"the task to verify cannot be {told}",
+        f"the task to verify cannot be {description}",
         expected="a task file, the name of a shipped task, or a task from visup.load_task",
     )
 
@@ -136,10 +136,10 @@ def _actors(actors: object) -> dict[str, tuple[str, ...]]:
             f"actors cannot be {actors!r}",
             expected="a mapping of actors to models, such as {'satellite': 'spartan'}",
         )
-    return {str(actor): _models_of(str(actor), models) for actor, models in actors.items()}
+    return {str(actor): _model_names(str(actor), models) for actor, models in actors.items()}
 
 
-def _models_of(actor: str, models: object) -> tuple[str, ...]:
+def _model_names(actor: str, models: object) -> tuple[str, ...]:
     names = (models,) if isinstance(models, str) else models
     if isinstance(names, Sequence) and names and all(isinstance(n, str) and n for n in names):
         return tuple(names)
@@ -149,9 +149,9 @@ def _models_of(actor: str, models: object) -> tuple[str, ...]:
     )
 
 
-def _worded(fault: ValidationError) -> SettingsError:
+def _settings_error(error: ValidationError) -> SettingsError:
     """The first thing that is wrong, in one sentence."""
-    first = fault.errors()[0]
+    first = error.errors()[0]
     name = ".".join(str(part) for part in first["loc"][:1])
     expected = first["msg"].removeprefix("Input should be ").partition(",")[0]
     return SettingsError(f"the setting '{name}' cannot be {first['input']!r}", expected=expected)

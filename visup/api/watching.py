@@ -30,7 +30,7 @@ from visup.runs.runner import Audience, fresh_folder, supervised
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import final_verdict
 
-KEPT_STEPS = 2000
+MAX_STEPS = 2000
 """Steps that a run keeps in memory, about 100 kB each; all events and alerts are kept."""
 
 
@@ -100,16 +100,16 @@ class Run(Iterator[Step]):
     def __init__(self, settings: WatchSettings, out: str | os.PathLike[str] | None = None) -> None:
         self.settings = settings
         self.result: RunResult | None = None
-        self._steps: deque[Step] = deque(maxlen=KEPT_STEPS)
+        self._steps: deque[Step] = deque(maxlen=MAX_STEPS)
         self._events: list[Event] = []
         self._alerts: dict[int, Alert] = {}
         self._frame: Frame | None = None
-        self._begun = False
+        self._started = False
         folder = fresh_folder(Path(out), settings.source) if out is not None else None
-        self._run = supervised(settings, folder, Audience((self._note,)))
+        self._run = supervised(settings, folder, Audience((self._store,)))
 
     def __next__(self) -> Step:
-        self._begun = True
+        self._started = True
         try:
             step = next(self._run)
         except StopIteration as end:
@@ -129,14 +129,14 @@ class Run(Iterator[Step]):
         self.stop()
 
     def __repr__(self) -> str:
-        state = "ended" if self.result else "under way" if self._begun else "not started"
+        state = "ended" if self.result else "under way" if self._started else "not started"
         return f"Run({redacted(self.settings.source)!r}, {state}, {len(self._events)} events)"
 
     def __rich__(self) -> RenderableType:
-        return with_picture(self._summary(), self._last())
+        return with_picture(self._summary(), self._last_step())
 
     def _repr_html_(self) -> str:
-        return html_with_picture(self._summary(), self._last())
+        return html_with_picture(self._summary(), self._last_step())
 
     def narrate(self) -> Iterator[Event]:
         """Watch the rest of the source, and yield notable events as they come.
@@ -158,7 +158,7 @@ class Run(Iterator[Step]):
 
     def stop(self) -> Self:
         """End the run here; the verdict and the recording cover what was seen so far."""
-        if self.result is None and self._begun:
+        if self.result is None and self._started:
             try:
                 self._run.throw(KeyboardInterrupt())
             except StopIteration as end:
@@ -167,41 +167,43 @@ class Run(Iterator[Step]):
 
     @property
     def steps(self) -> Records[Step]:
-        """The steps so far, the latest `KEPT_STEPS` of them; the last one carries its frame."""
-        self._ask()
-        last = self._last()
+        """The steps so far, the latest `MAX_STEPS` of them; the last one carries its frame."""
+        self._finish_unless_started()
+        last = self._last_step()
         return Records(Step, [*islice(self._steps, len(self._steps) - 1), last] if last else ())
 
     @property
     def events(self) -> Records[Event]:
         """The events so far, in order."""
-        self._ask()
+        self._finish_unless_started()
         return Records(Event, self._events)
 
     @property
     def alerts(self) -> Records[Alert]:
         """All alerts so far in their current state, in the order in which they opened."""
-        self._ask()
+        self._finish_unless_started()
         return Records(Alert, [self._alerts[i] for i in sorted(self._alerts)])
 
     @property
     def verdict(self) -> Verdict | None:
         """The verdict so far, or the final one; None if there was no task and nothing was wrong."""
-        self._ask()
+        self._finish_unless_started()
         if self.result is not None:
             return self.result.verdict
         return self._verdict_so_far()
 
-    def _ask(self) -> None:
-        """Asking for results before the first step means asking about the whole source."""
-        if not self._begun:
+    def _finish_unless_started(self) -> None:
+        """Watch the whole source if results are asked for before the first step."""
+        if not self._started:
             self.finish()
 
-    def _last(self) -> Step | None:
+    def _last_step(self) -> Step | None:
         return replace(self._steps[-1], frame=self._frame) if self._steps else None
 
     def _summary(self) -> RenderableType:
-        state = "" if self.result else "; the run is under way" if self._begun else "; not started"
+        state = (
+            "" if self.result else "; the run is under way" if self._started else "; not started"
+        )
         verdict = self.result.verdict if self.result else self._verdict_so_far()
         return run_summary(
             f"{redacted(self.settings.source)}{state}",
@@ -210,7 +212,7 @@ class Run(Iterator[Step]):
             has_task=bool(self.settings.tasks),
         )
 
-    def _note(self, step: Step, frame: Frame) -> None:
+    def _store(self, step: Step, frame: Frame) -> None:
         self._frame = frame
         self._steps.append(step)
         self._events += step.events

@@ -1,4 +1,4 @@
-"""`visup behaviours`: list what is installed, check one of your own, begin a new one."""
+"""`visup behaviours`: list installed behaviours, check one, create a new one from a template."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class {title}:
     def __init__(self, settings=None):
         self.settings = settings or self.Settings()
 
-    def perceive(self, frame, seen, directives):
+    def perceive(self, frame, observation, directives):
         grey = frame.image.mean(axis=2)
         y, x = divmod(int(grey.argmax()), grey.shape[1])
         contrast = float(grey[y, x] - grey.mean())
@@ -68,8 +68,8 @@ def list_behaviours() -> None:
         try:
             factory = registry.factory(name)
             table.add_row(name, *_row(factory.contract), factory.where)
-        except BehaviourError as fault:
-            broken.append(str(fault))
+        except BehaviourError as error:
+            broken.append(str(error))
     console.print(table)
     for line in broken:
         console.print(line, style="yellow", markup=False)
@@ -77,14 +77,14 @@ def list_behaviours() -> None:
 
 @app.command("check")
 def check(
-    where: Annotated[
+    target: Annotated[
         str,
         typer.Argument(
             metavar="FILE",
             help="A Python file, package.module:Class, or the name of an installed behaviour.",
         ),
     ],
-    setting: Annotated[
+    assignments: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="NAME.KEY=VALUE", help="A setting of the behaviour."),
     ] = None,
@@ -95,9 +95,9 @@ def check(
     """
     from visup.agent.plugins.settings import parse_settings
 
-    console, values = make_console(), parse_settings(setting or ())
-    kept = [_check(console, factory, values) for factory in _factories(where)]
-    raise typer.Exit(0 if all(kept) else 1)
+    console, values = make_console(), parse_settings(assignments or ())
+    passed = [_check(console, factory, values) for factory in _factories(target)]
+    raise typer.Exit(0 if all(passed) else 1)
 
 
 @app.command("new")
@@ -120,19 +120,19 @@ def new(
     try:
         with path.open("x", encoding="utf-8") as file:
             file.write(TEMPLATE.format(name=name, title=title))
-    except FileExistsError as fault:
-        raise OutputError("the file already exists", where=str(path)) from fault
-    except OSError as fault:
-        raise OutputError(f"cannot be written: {fault.strerror}", where=str(path)) from fault
+    except FileExistsError as error:
+        raise OutputError("the file already exists", where=str(path)) from error
+    except OSError as error:
+        raise OutputError(f"cannot be written: {error.strerror}", where=str(path)) from error
     echo(f"{path}: edit it, then run\n  visup behaviours check {path}")
 
 
-def _factories(where: str) -> list[BehaviourFactory]:
+def _factories(target: str) -> list[BehaviourFactory]:
     from visup.agent.plugins.factory import find_factories
     from visup.agent.plugins.registry import discover_behaviours
 
     registry = discover_behaviours()
-    return [registry.factory(where)] if where in registry.names() else find_factories(where)
+    return [registry.factory(target)] if target in registry.names() else find_factories(target)
 
 
 def _check(
@@ -141,16 +141,16 @@ def _check(
     from visup.testing import check_results
 
     name = factory.contract.name if factory.contract else factory.where
-    given = values.get(name, {})
-    factory.make(given)  # what cannot be made at all is an error, not a finding
-    found = check_results(lambda: factory.make(given))
+    settings = values.get(name, {})
+    factory.make(settings)  # what cannot be made at all is an error, not a finding
+    results = check_results(lambda: factory.make(settings))
     console.print(f"{name} ({factory.where})", markup=False, style="bold")
-    for finding in found:
-        mark = "[green]ok[/green]    " if finding.passed else "[red]failed[/red]"
+    for result in results:
+        mark = "[green]ok[/green]    " if result.passed else "[red]failed[/red]"
         console.print(f"  {mark} ", end="")
-        detail = f": {finding.detail}" if finding.detail else ""
-        console.print(f"{finding.check}{detail}", markup=False, soft_wrap=True)
-    return all(f.passed for f in found)
+        detail = f": {result.detail}" if result.detail else ""
+        console.print(f"{result.check}{detail}", markup=False, soft_wrap=True)
+    return all(r.passed for r in results)
 
 
 def _row(contract: Contract | None) -> Iterator[str]:

@@ -6,14 +6,14 @@ from typing import Annotated
 
 import typer
 
-from visup.commands.options import Given, SettingsFile, takes
+from visup.commands.options import OptionValues, SettingsFile, takes
 from visup.commands.watch import watch_settings
 from visup.runs.settings import WatchSettings
 
 
 @takes(WatchSettings)
 def check(
-    setting: Given,
+    options: OptionValues,
     source: Annotated[
         str, typer.Argument(help="Video file, folder of images, camera index or URL.")
     ],
@@ -27,6 +27,6 @@ def check(
     from visup.runs.inputs.preflight import preflight
     from visup.terminal.console import echo
 
-    for line in preflight(watch_settings(source, setting, settings_file)):
+    for line in preflight(watch_settings(source, options, settings_file)):
         echo(line)
     echo("A run can start.")

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
 app = typer.Typer(no_args_is_help=True)
 
-MOST_WIDTH = 1284
-"""Pixels: two panels and the gap between them."""
+MAX_WIDTH = 1284
+"""Width of the video, pixels: two panels and the gap between them."""
 
 
 @app.callback()
@@ -41,7 +41,7 @@ def motion(
     from visup.commands.watch import progress_bar
     from visup.percepts.video import open_source
 
-    target = checked_target(out or Path(f"{_name(source)}-motion.webm"))
+    target = checked_target(out or Path(f"{_source_name(source)}-motion.webm"))
     console = make_console(soft_wrap=True)
     with (
         open_source(video_of(source), every=every, fps=fps) as video,
@@ -62,17 +62,17 @@ def _write(video: VideoSource, target: Path, limit: int | None, advance: RunProg
     from visup.report.video import WebmWriter
 
     segmenter, written = MotionSegmenter(), 0
-    known = [n for n in (_given(video), limit) if n is not None]
-    with WebmWriter(target, video.fps / video.every, MOST_WIDTH) as writer:
+    limits = [n for n in (_frame_count(video), limit) if n is not None]
+    with WebmWriter(target, video.fps / video.every, MAX_WIDTH) as writer:
         for frame in islice(video, limit):
             regions = segmenter.step(frame)
             writer.write(draw_motion(frame, segmenter.trace, regions))
             written += 1
-            advance(written, min(known, default=None))
+            advance(written, min(limits, default=None))
     return written
 
 
-def _given(video: VideoSource) -> int | None:
+def _frame_count(video: VideoSource) -> int | None:
     """The number of frames of a source, if known."""
     return None if video.frame_count is None else -(-video.frame_count // video.every)
 
@@ -106,8 +106,8 @@ def checked_target(path: Path) -> Path:
     return path
 
 
-def _name(source: str) -> str:
+def _source_name(source: str) -> str:
     """The name of the source, without folder or extension."""
     path = Path(source)
-    word = path.parent.name if path.stem in ("video", "frames") else path.stem
-    return word or "source"
+    name = path.parent.name if path.stem in ("video", "frames") else path.stem
+    return name or "source"

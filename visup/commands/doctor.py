@@ -147,19 +147,19 @@ def speeds(frames: int = SPEED_FRAMES) -> Iterator[str]:
 
 
 def _library(name: str, purpose: str) -> CheckedPart:
-    found = _version(name)
-    if found is None:
+    version = _version(name)
+    if version is None:
         return CheckedPart(name, "broken", f"pip install {name}", purpose)
-    return CheckedPart(name, "ok", found, purpose)
+    return CheckedPart(name, "ok", version, purpose)
 
 
 def _extra(extra: str, purpose: str, names: tuple[str, ...]) -> CheckedPart:
     """An extra is installed when all its libraries are."""
-    found = {name: _version(name) for name in names}
+    versions = {name: _version(name) for name in names}
     label = f"visup[{extra}]"
-    if None in found.values():
+    if None in versions.values():
         return CheckedPart(label, "missing", f"pip install '{label}'", purpose)
-    return CheckedPart(label, "ok", ", ".join(f"{n} {v}" for n, v in found.items()), purpose)
+    return CheckedPart(label, "ok", ", ".join(f"{n} {v}" for n, v in versions.items()), purpose)
 
 
 def _version(name: str) -> str | None:
@@ -175,8 +175,8 @@ def _checked_part(what: str, check: Callable[[], str]) -> CheckedPart:
     """The result of one check; any exception is a finding, since finding faults is the purpose."""
     try:
         return CheckedPart(what, "ok", check())
-    except Exception as fault:
-        return CheckedPart(what, "broken", f"{type(fault).__name__}: {fault}")
+    except Exception as error:
+        return CheckedPart(what, "broken", f"{type(error).__name__}: {error}")
 
 
 def _codecs() -> str:

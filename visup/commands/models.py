@@ -133,11 +133,11 @@ def learn(
     from visup.teaching.learning import learn_from
     from visup.teaching.outlines import parse_things
 
-    lesson = learn_from(run, models, parse_things(thing or ()), source, views)
-    for sentence in lesson.messages:
+    result = learn_from(run, models, parse_things(thing or ()), source, views)
+    for sentence in result.messages:
         echo(sentence)
     out = out or models.with_name(f"{models.stem}-taught.png")
-    write_picture(out, taught_views_sheet(lesson.views))
+    write_picture(out, taught_views_sheet(result.views))
 
 
 @app.command("list")
@@ -154,9 +154,9 @@ def list_models(db: Db) -> None:
     table = Table(*columns, title=str(db))
     taught = Counter(view.name for view in database.taught)
     for name in database.names():
-        own = [database.views[k] for k in database.views.named({name})]
-        directions = sum(len(v.seen_from) for v in own)
-        counts = (len(own), directions, sum(v.cut for v in own), taught[name])
+        model_views = [database.views[k] for k in database.views.named({name})]
+        directions = sum(len(v.seen_from) for v in model_views)
+        counts = (len(model_views), directions, sum(v.cut for v in model_views), taught[name])
         table.add_row(name, *map(str, counts))
     make_console().print(table)
     _print_size(database)
@@ -262,12 +262,12 @@ def _print_ranking(ranking: Ranking, image: Path, views: int) -> None:
     from rich.table import Table
 
     table = Table(title=image.name, title_justify="left")
-    for heading, side in (("", "right"), ("object", "left"), ("view", "right")):
-        table.add_column(heading, justify=side, overflow="fold")  # type: ignore[arg-type]
+    for heading, justify in (("", "right"), ("object", "left"), ("view", "right")):
+        table.add_column(heading, justify=justify, overflow="fold")  # type: ignore[arg-type]
     for heading in ("similarity", "graph", "outline", "area", "rotation"):
         table.add_column(heading, justify="right", no_wrap=True)
     for rank, m in enumerate(ranking.matches, start=1):
-        turn = f"{math.degrees(m.rotation):.0f}°"
+        rotation = f"{math.degrees(m.rotation):.0f}°"
         mirrored = " m" if m.terms.mirrored else ""
         terms = (
             m.similarity,
@@ -276,7 +276,7 @@ def _print_ranking(ranking: Ranking, image: Path, views: int) -> None:
             m.terms.area_similarity,
         )
         figures = (f"{t:.3f}" for t in terms)
-        table.add_row(str(rank), m.view.name, str(m.view.number), *figures, turn + mirrored)
+        table.add_row(str(rank), m.view.name, str(m.view.number), *figures, rotation + mirrored)
     make_console().print(table)
     if any(m.terms.mirrored for m in ranking.matches):
         echo("m: mirrored, as seen from behind")

@@ -1,7 +1,8 @@
 """Options of commands, made from the settings records that they fill.
 
 `takes(WatchSettings)` gives a command one option for each setting that is described by an `Option`, and
-hands it those that the user gave, by the names of the record's fields: `WatchSettings(source, **given)`.
+passes it the values that the user gave, by the names of the record's fields:
+`WatchSettings(source, **values)`.
 """
 
 from __future__ import annotations
@@ -17,8 +18,8 @@ import typer
 
 from visup.runs.settings import Option
 
-Given = dict[str, Any]
-"""Settings given by the user, by field name."""
+OptionValues = dict[str, Any]
+"""Values of the options that the user gave, by the name of the field."""
 
 SettingsFile = Annotated[
     Path | None,
@@ -29,7 +30,7 @@ SettingsFile = Annotated[
     ),
 ]
 
-REPLAYED = ("tasks", "rules", "early", "at_end", "actors", "zones")
+REPLAY_SETTINGS = ("tasks", "rules", "early", "at_end", "actors", "zones")
 """The settings that a replay of a recorded run may change."""
 
 
@@ -78,7 +79,7 @@ class Setting:
         return Parameter(self.name, Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
 
     def read(self, value: Any) -> Any:
-        """The setting from the given value; None or the default if none was given."""
+        """The setting, from the value of its option; None or the default without one."""
         if not self.repeated:
             return value
         return self.option.parse(value) if self.option.parse and value else tuple(value or ())
@@ -88,21 +89,21 @@ _METAVARS = {int: "N", float: "NUMBER"}
 
 
 def number_parser(kind: type[int] | type[float], at_least: float | None) -> Callable[[Any], Any]:
-    """A parser of typed numbers, with readable messages for invalid ones.
+    """A parser of numbers on the command line, with readable messages for invalid ones.
 
     Args:
         kind: `int` or `float`.
         at_least: The smallest value, or None.
     """
-    wanted = "a whole number" if kind is int else "a number"
-    expected = wanted if at_least is None else f"{wanted}, {at_least:g} or more"
+    description = "a whole number" if kind is int else "a number"
+    expected = description if at_least is None else f"{description}, {at_least:g} or more"
 
     def read(text: Any) -> Any:
         try:
             value = kind(text)
         except ValueError:
-            more = "" if expected == wanted else f"; expected {expected}"
-            raise typer.BadParameter(f"'{text}' is not {wanted}{more}") from None
+            suffix = "" if expected == description else f"; expected {expected}"
+            raise typer.BadParameter(f"'{text}' is not {description}{suffix}") from None
         if at_least is not None and not value >= at_least:
             raise typer.BadParameter(f"{text} is too small; expected {expected}")
         return value
@@ -113,10 +114,11 @@ def number_parser(kind: type[int] | type[float], at_least: float | None) -> Call
 def settings_of(record: type) -> Iterator[Setting]:
     """The settings of a record that have an option, in order."""
     hints = get_type_hints(record, include_extras=True)
-    for each in fields(record):
-        kind, *notes = get_args(hints[each.name]) if _annotated(hints[each.name]) else (None,)
-        default = None if each.default is MISSING else each.default
-        yield from (Setting(each.name, kind, default, n) for n in notes if isinstance(n, Option))
+    for f in fields(record):
+        hint = hints[f.name]
+        kind, *metadata = get_args(hint) if _annotated(hint) else (None,)
+        default = None if f.default is MISSING else f.default
+        yield from (Setting(f.name, kind, default, m) for m in metadata if isinstance(m, Option))
 
 
 def flags_of(record: type, names: Collection[str]) -> list[str]:
@@ -134,21 +136,23 @@ def takes(
         only: Names of the fields that it takes; empty for all.
         defaults: Default values of fields, where they differ from the record's.
     """
-    taken = [[s for s in settings_of(record) if not only or s.name in only] for record in records]
+    by_record = [
+        [s for s in settings_of(record) if not only or s.name in only] for record in records
+    ]
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:
-        own = list(signature(command, eval_str=True).parameters.values())[len(records) :]
+        own_parameters = list(signature(command, eval_str=True).parameters.values())[len(records) :]
 
         @wraps(command)
         def run(**values: Any) -> None:
-            given = [_given(settings, values) for settings in taken]
-            command(*given, **values)
+            values_by_record = [_changed_values(settings, values) for settings in by_record]
+            command(*values_by_record, **values)
 
-        parameters = [s.parameter() for settings in taken for s in settings]
+        parameters = [s.parameter() for settings in by_record for s in settings]
         run.__signature__ = Signature(  # type: ignore[attr-defined]
             [
                 *(p.replace(default=defaults.get(p.name, p.default)) for p in parameters),
-                *(p.replace(kind=Parameter.KEYWORD_ONLY) for p in own),
+                *(p.replace(kind=Parameter.KEYWORD_ONLY) for p in own_parameters),
             ]
         )
         return run
@@ -156,7 +160,7 @@ def takes(
     return decorate
 
 
-def _given(settings: list[Setting], values: dict[str, Any]) -> Given:
+def _changed_values(settings: list[Setting], values: dict[str, Any]) -> OptionValues:
     """The values of some settings that differ from their defaults."""
     read = {s.name: s.read(values.pop(s.name)) for s in settings}
     return {s.name: read[s.name] for s in settings if read[s.name] not in (s.default, ())}

@@ -38,7 +38,7 @@ def render(
     ] = None,
 ) -> None:
     """Render a scenario or a random world: a video, a mask for each frame, and the ground truth."""
-    needs_renderer()
+    require_renderer()
     if (scenario is None) == (random is None):
         from visup.agent.model.errors import SettingsError
 
@@ -77,35 +77,37 @@ def _render_random(kind: str, seed: int, outcome: str | None, out: Path, size: s
 def _render_orbit(seed: int, outcome: str | None, out: Path, size: str | None) -> None:
     from visup.render.orbits.random_orbit import random_orbit
 
-    found = random_orbit(seed, outcome)
-    _write(found if size is None else found.resized(parse_size(size)), out, "mp4")
+    scenario = random_orbit(seed, outcome)
+    _write(scenario if size is None else scenario.resized(parse_size(size)), out, "mp4")
 
 
-def _render_scenario(scenario: str, out: Path, container: str, size: str | None) -> None:
+def _render_scenario(name: str, out: Path, container: str, size: str | None) -> None:
     from visup.render.scenario.library import find_scenario
 
-    found = find_scenario(scenario)
-    _write(found if size is None else found.resized(parse_size(size)), out, container)
+    scenario = find_scenario(name)
+    _write(scenario if size is None else scenario.resized(parse_size(size)), out, container)
 
 
-def _write(found: Scenario, out: Path, container: str) -> None:
+def _write(scenario: Scenario, out: Path, container: str) -> None:
     from rich.progress import Progress
 
     from visup.render.output.writer import write_mission
 
     with Progress(transient=True) as bar:
-        task = bar.add_task("frames", total=found.frame_count)
+        task = bar.add_task("frames", total=scenario.frame_count)
         write_mission(
-            found,
+            scenario,
             out,
             f".{container.lstrip('.')}",
             lambda done, _: bar.update(task, completed=done),
         )
-    make_console().print(f"{found.frame_count} frames of {found.name} in {out}", highlight=False)
+    make_console().print(
+        f"{scenario.frame_count} frames of {scenario.name} in {out}", highlight=False
+    )
 
 
-def needs_renderer() -> None:
-    """Check that the renderer is installed.
+def require_renderer() -> None:
+    """Refuse to go on unless the renderer is installed.
 
     Raises:
         ExtraMissingError: It is not.

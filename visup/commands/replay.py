@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from visup.commands.options import REPLAYED, Given, takes
+from visup.commands.options import REPLAY_SETTINGS, OptionValues, takes
 from visup.runs.settings import Option, WatchSettings
 from visup.terminal.console import make_console
 
@@ -43,10 +43,10 @@ class ReplayComparison:
         return Recording.open(self.against) if self.against else recording if self.diff else None
 
 
-@takes(WatchSettings, ReplayComparison, only=(*REPLAYED, "diff", "against", "quiet"))
+@takes(WatchSettings, ReplayComparison, only=(*REPLAY_SETTINGS, "diff", "against", "quiet"))
 def replay(
-    setting: Given,
-    compared: Given,
+    options: OptionValues,
+    comparison_options: OptionValues,
     run: Annotated[Path, typer.Argument(help="Run folder of `visup watch`, or its journal.")],
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Write the replay to this folder as a run.")
@@ -64,10 +64,10 @@ def replay(
     from visup.runs.runner import fresh_folder
     from visup.terminal.narrator import Narrator
 
-    console, comparison = make_console(), ReplayComparison(**compared)
+    console, comparison = make_console(), ReplayComparison(**comparison_options)
     recording = Recording.open(run)
     other = comparison.other(recording)
-    settings = settings_for(recording, **setting)
+    settings = settings_for(recording, **options)
     folder = fresh_folder(out, settings.source) if out else None
     silent = comparison.quiet or other
     narrator = Narrator(console)

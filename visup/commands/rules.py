@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from visup.commands.options import REPLAYED, Given, takes
+from visup.commands.options import REPLAY_SETTINGS, OptionValues, takes
 from visup.runs.settings import WatchSettings
 from visup.terminal.console import echo, echo_json
 
@@ -23,7 +23,16 @@ Files = Annotated[
     list[Path] | None, typer.Argument(help="Rule files; by default the shipped rules.")
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Write JSON instead of text.")]
-EXPLAINED = ("tasks", "models", "rules", "early", "actors", "every", "fps", "fov_vertical_deg")
+EXPLAIN_SETTINGS = (
+    "tasks",
+    "models",
+    "rules",
+    "early",
+    "actors",
+    "every",
+    "fps",
+    "fov_vertical_deg",
+)
 """Settings of a run that affect rules."""
 
 
@@ -34,19 +43,19 @@ def check(files: Annotated[list[Path], typer.Argument(help="Rule files.")]) -> N
     from visup.rules.language.diagnostics import raise_errors
     from visup.rules.language.parser import load_rules
 
-    faults: list[VisupError] = []
+    errors: list[VisupError] = []
     for file in files:
         try:
-            found = load_rules(file)
-        except ErrorGroup as errors:
-            faults += errors.errors
+            rules = load_rules(file)
+        except ErrorGroup as group:
+            errors += group.errors
         except VisupError as error:
-            faults.append(error)
+            errors.append(error)
         else:
             echo(f"{file}: ok")
-            for rule in found:
+            for rule in rules:
                 echo(f"  {rule.name}: {_cost(rule)}")
-    raise_errors(faults)
+    raise_errors(errors)
 
 
 @app.command("list")
@@ -55,10 +64,10 @@ def list_rules(files: Files = None, as_json: AsJson = False) -> None:
     from visup.rules.language.parser import load_rules, shipped_rules
     from visup.rules.monitoring.cost import cost_of
 
-    found = [r for file in files for r in load_rules(file)] if files else list(shipped_rules())
+    rules = [r for file in files for r in load_rules(file)] if files else list(shipped_rules())
     if as_json:
         rows: list[dict[str, Any]] = []
-        for rule in found:
+        for rule in rules:
             cost = cost_of(rule)
             rows.append(
                 {
@@ -73,32 +82,32 @@ def list_rules(files: Files = None, as_json: AsJson = False) -> None:
             )
         echo_json(rows, indent=2)
         return
-    width = max((len(r.name) for r in found), default=0)
-    for rule in found:
+    width = max((len(r.name) for r in rules), default=0)
+    for rule in rules:
         echo(f"{rule.name:{width}}  {rule.severity.name.lower():8}  {_cost(rule)}")
 
 
 @app.command()
-@takes(WatchSettings, only=EXPLAINED)
+@takes(WatchSettings, only=EXPLAIN_SETTINGS)
 def explain(
-    setting: Given,
+    options: OptionValues,
     source: Annotated[
         str, typer.Argument(help="Video file, folder of images, camera, URL, or a run folder.")
     ],
-    at: Annotated[float, typer.Option("--at", min=0.0, help="Time in the video, seconds.")],
+    time_s: Annotated[float, typer.Option("--at", min=0.0, help="Time in the video, seconds.")],
     rule: Annotated[str | None, typer.Option("--rule", help="Only this rule.")] = None,
 ) -> None:
     """Explain why rules were true, false or unknown for each choice of objects at a given time."""
     from visup.agent.model.errors import SettingsError
 
     mind = None
-    for mind in _minds(source, setting):
-        if mind.time >= at:
+    for mind in _minds(source, options):
+        if mind.time >= time_s:
             break
-    if mind is None or mind.time < at:
-        raise SettingsError(f"--at is {at:g} s, after the end of the video", where=source)
-    found = explanations(mind, rule)
-    for text in found or [f"at {mind.time:g} s too few objects are in view to evaluate any rule"]:
+    if mind is None or mind.time < time_s:
+        raise SettingsError(f"--at is {time_s:g} s, after the end of the video", where=source)
+    texts = explanations(mind, rule)
+    for text in texts or [f"at {mind.time:g} s too few objects are in view to evaluate any rule"]:
         echo(text)
 
 
@@ -109,7 +118,7 @@ def judge(
         Path,
         typer.Option("--signal", help="Table of signals (CSV) whose first column is the time."),
     ],
-    reading: Annotated[
+    interpolation: Annotated[
         Literal["held", "linear", "samples"],
         typer.Option("--between", help="Values between samples: held, linear, or samples alone."),
     ] = "held",
@@ -131,19 +140,21 @@ def judge(
 
     table, outside = read_signals(signals), Ends("unknown" if ends == "unknown" else "cut", ends)
     samples = list(zip(table.times, table.rows, strict=True))
-    found = [s for r in load_rules(file) for s in judge_rule(r, samples, reading, outside, end)]
+    spans = [
+        s for r in load_rules(file) for s in judge_rule(r, samples, interpolation, outside, end)
+    ]
     if as_json:
         rows = [
             {"rule": s.rule, "begin_s": s.begin_s, "end_s": s.end_s, "truth": s.truth.value}
-            for s in found
+            for s in spans
         ]
         echo_json(rows, indent=2)
         return
-    for line in map(str, found) if found else ("no rule was true",):
+    for line in map(str, spans) if spans else ("no rule was true",):
         echo(line)
 
 
-def _minds(source: str, setting: Given) -> Iterator[Mind]:
+def _minds(source: str, options: OptionValues) -> Iterator[Mind]:
     """The mind after each step of a video or of a recorded run."""
     from visup.agent.storage.journal_reader import Recording, is_run
     from visup.runs.replay import settings_for
@@ -151,24 +162,27 @@ def _minds(source: str, setting: Given) -> Iterator[Mind]:
 
     if is_run(source):
         recording = Recording.open(Path(source))
-        given = {k: v for k, v in setting.items() if k in REPLAYED}
-        agent, answers = reasoning_agent(settings_for(recording, **given)), recording.answers()
-        for seen in recording.observations():
-            yield agent.reason(seen, answers.get(seen.frame_index, {})).mind
+        replay_options = {k: v for k, v in options.items() if k in REPLAY_SETTINGS}
+        agent, answers = (
+            reasoning_agent(settings_for(recording, **replay_options)),
+            recording.answers(),
+        )
+        for observation in recording.observations():
+            yield agent.reason(observation, answers.get(observation.frame_index, {})).mind
         return
-    settings = WatchSettings(source, **setting)
+    settings = WatchSettings(source, **options)
     agent = build_agent(settings)
     with open_video(settings) as video:
         for frame in video:
             yield agent.step(frame).mind
 
 
-def explanations(mind: Mind, only: str | None) -> list[str]:
+def explanations(mind: Mind, name: str | None) -> list[str]:
     """Why each rule is true, false or unknown for each choice of objects in a mind.
 
     Args:
         mind: A mind in which rules have been evaluated.
-        only: Name of a single rule, or None for all.
+        name: Name of a single rule, or None for all.
 
     Raises:
         RuleError: There is no rule of that name.
@@ -176,10 +190,10 @@ def explanations(mind: Mind, only: str | None) -> list[str]:
     from visup.rules.safety.queries import evaluation_of, explain, object_choices, rule_named
 
     values = evaluation_of(mind)
-    wanted = [rule_named(values, only)] if only else list(values.compiled.rules)
+    rules = [rule_named(values, name)] if name else list(values.compiled.rules)
     return [
         str(explain(mind, rule.name, *ids))
-        for rule in wanted
+        for rule in rules
         for ids in object_choices(values, rule)
     ]
 
@@ -188,11 +202,11 @@ def _cost(rule: Rule) -> str:
     from visup.rules.monitoring.cost import cost_of
 
     cost = cost_of(rule)
-    late = f"reported {cost.delay_s:g} s late" if cost.delay_s else "reported immediately"
-    shown = f"{late}, at most {cost.bytes / 1024:,.1f} kB per choice of objects"
+    delay = f"reported {cost.delay_s:g} s late" if cost.delay_s else "reported immediately"
+    text = f"{delay}, at most {cost.bytes / 1024:,.1f} kB per choice of objects"
     if cost.early_delay_s == cost.delay_s:
-        return shown
-    least = (
+        return text
+    earliest = (
         f"at least {cost.early_delay_s:g} s late" if cost.early_delay_s else "possibly immediately"
     )
-    return f"{shown}; with --early, {least}"
+    return f"{text}; with --early, {earliest}"

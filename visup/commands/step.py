@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from visup.commands.options import REPLAYED, Given, SettingsFile, flags_of, takes
+from visup.commands.options import REPLAY_SETTINGS, OptionValues, SettingsFile, flags_of, takes
 from visup.commands.watch import watch_settings
 from visup.runs.settings import WatchSettings
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from visup.agent.cycle.agent import Agent
     from visup.stepping import ObservationSource
 
-OPTIONS = (
+STEP_SETTINGS = (
     *("tasks", "models", "rules", "actors", "every", "behaviours", "plugins", "fps"),
     *("fov_vertical_deg", "zones", "plugin_settings", "isolate", "attention", "preset"),
     *("detections", "motion"),
@@ -30,9 +30,9 @@ OPTIONS = (
 """Settings that matter when stepping, where no frame is late and nothing is recorded."""
 
 
-@takes(WatchSettings, only=OPTIONS)
+@takes(WatchSettings, only=STEP_SETTINGS)
 def step(
-    setting: Given,
+    options: OptionValues,
     source: Annotated[
         str, typer.Argument(help="Video file, folder of images, camera, URL, or a run folder.")
     ],
@@ -49,15 +49,15 @@ def step(
 
     with ExitStack() as stack:
         if is_run(source):
-            agent, frames, video = _recorded(Path(source), setting, settings_file)
+            agent, frames, video = _recorded(Path(source), options, settings_file)
         else:
-            settings = watch_settings(source, setting, settings_file)
+            settings = watch_settings(source, options, settings_file)
             (agent, frames), video = _live(settings, stack), settings.source
         session = Session(agent, frames, picture=_pictures(video, stack))
-        at_prompt = sys.stdin.isatty()
+        interactive = sys.stdin.isatty()
         code = session.run(read_commands(session))
     # At a prompt the user sees a mistake and corrects it; in a pipe only the exit code shows it.
-    raise typer.Exit(0 if at_prompt else code)
+    raise typer.Exit(0 if interactive else code)
 
 
 def _live(settings: WatchSettings, stack: ExitStack) -> tuple[Agent, Any]:
@@ -93,7 +93,7 @@ def _pictures(source: str, stack: ExitStack) -> Callable[[int], NDArray[np.uint8
 
 
 def _recorded(
-    run: Path, given: Given, settings_file: Path | None
+    run: Path, options: OptionValues, settings_file: Path | None
 ) -> tuple[Agent, ObservationSource, str]:
     from visup.agent.model.errors import SettingsError
     from visup.agent.storage.journal_reader import Recording
@@ -101,13 +101,13 @@ def _recorded(
     from visup.runs.wiring import reasoning_agent
     from visup.stepping import RecordedObservations
 
-    beyond = flags_of(WatchSettings, [name for name in given if name not in REPLAYED])
-    beyond += ["--settings"] if settings_file else []
-    if beyond:
+    unsupported = flags_of(WatchSettings, [name for name in options if name not in REPLAY_SETTINGS])
+    unsupported += ["--settings"] if settings_file else []
+    if unsupported:
         raise SettingsError(
-            f"perception is not repeated on a recorded run: {', '.join(beyond)} cannot be changed",
+            f"perception is not repeated on a recorded run: {', '.join(unsupported)} cannot be changed",
             expected="--task, --rules, --actor or --zones",
         )
     recording = Recording.open(run)
-    settings = settings_for(recording, **given)
+    settings = settings_for(recording, **options)
     return reasoning_agent(settings), RecordedObservations(recording), settings.source

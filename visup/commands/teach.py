@@ -63,16 +63,16 @@ def teach(
             expected="--models DB",
             hint="a database that does not exist yet is created",
         )
-    lesson = _lesson(clip, models, frame, outline or [], brief, browser)
-    if lesson is None:
+    result = _teach(clip, models, frame, outline or [], brief, browser)
+    if result is None:
         echo("Nothing was stored.")
         return
-    for sentence in lesson.messages:
+    for sentence in result.messages:
         echo(sentence)
-    _draw(lesson, out or models.with_name(f"{models.stem}-taught.png"))
+    _draw_views(result, out or models.with_name(f"{models.stem}-taught.png"))
 
 
-def _lesson(
+def _teach(
     clip: str | None,
     models: Path,
     frame: int,
@@ -121,8 +121,8 @@ def _in_the_browser(
         return page.result
 
 
-def _draw(lesson: TeachingResult, out: Path) -> None:
+def _draw_views(result: TeachingResult, out: Path) -> None:
     from visup.commands.models import write_picture
     from visup.percepts.taught.drawing_views import taught_views_sheet
 
-    write_picture(out, taught_views_sheet(lesson.views))
+    write_picture(out, taught_views_sheet(result.views))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from visup.commands.options import Given, SettingsFile, takes
+from visup.commands.options import OptionValues, SettingsFile, takes
 from visup.runs.settings import Option, RunOptions, WatchSettings
 from visup.terminal.console import echo_json, make_console
 
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from visup.runs.runner import RunProgress
 
 
-LAG_SHOWN_S = 0.5
-"""Lag behind a live source is shown from this many seconds on; less is not noticeable."""
+MIN_SHOWN_LAG_S = 0.5
+"""A lag behind a live source is shown from this many seconds on; less is not noticeable."""
 
 
 def _parse_answers(texts: list[str]) -> dict[int, str]:
@@ -65,9 +65,9 @@ class Presentation:
 
 @takes(WatchSettings, RunOptions, Presentation)
 def watch(
-    setting: Given,
-    recording: Given,
-    shown: Given,
+    options: OptionValues,
+    run_options: OptionValues,
+    presentation: OptionValues,
     source: Annotated[
         str | None, typer.Argument(help="Video file, folder of images, camera index or URL.")
     ] = None,
@@ -84,17 +84,19 @@ def watch(
     """
     past = None
     if resume:
-        past = _interrupted(resume, setting, source, settings_file, shown.get("out"))
+        past = _interrupted(resume, options, source, settings_file, presentation.get("out"))
         settings = past.settings
     elif source is None:
         raise typer.BadParameter("give a video, or a run with --resume", param_hint="SOURCE")
     else:
-        settings = watch_settings(source, setting, settings_file)
-    result = run_and_report(settings, Presentation(**shown), RunOptions(**recording), past)
+        settings = watch_settings(source, options, settings_file)
+    result = run_and_report(settings, Presentation(**presentation), RunOptions(**run_options), past)
     raise typer.Exit(result.exit_code)
 
 
-def watch_settings(source: str, given: Given, settings_file: Path | None = None) -> WatchSettings:
+def watch_settings(
+    source: str, options: OptionValues, settings_file: Path | None = None
+) -> WatchSettings:
     """The settings of a run, from the options of a command.
 
     Raises:
@@ -105,12 +107,14 @@ def watch_settings(source: str, given: Given, settings_file: Path | None = None)
         from visup.runs.inputs.settings_file import read_settings_file
 
         from_file = read_settings_file(settings_file)
-        merged = merge_settings(from_file["plugin_settings"], given.get("plugin_settings", {}))
-        given = {**from_file, **given, "plugin_settings": merged}
-    return WatchSettings(source, **given)
+        merged = merge_settings(from_file["plugin_settings"], options.get("plugin_settings", {}))
+        options = {**from_file, **options, "plugin_settings": merged}
+    return WatchSettings(source, **options)
 
 
-def _interrupted(run: Path, setting: Given, source: str | None, *given: Any) -> InterruptedRun:
+def _interrupted(
+    run: Path, options: OptionValues, source: str | None, *other_options: Any
+) -> InterruptedRun:
     """The run to resume; its settings were fixed when it began, except for behaviours of the user's own."""
     from visup.agent.model.errors import SettingsError
     from visup.redaction import has_secret
@@ -118,18 +122,18 @@ def _interrupted(run: Path, setting: Given, source: str | None, *given: Any) -> 
 
     # The password of an address is not recorded, so such an address must be given again.
     address = source if source and has_secret(source) else None
-    if any((*given, source != address)) or setting.keys() - {"behaviours", "plugins"}:
+    if any((*other_options, source != address)) or options.keys() - {"behaviours", "plugins"}:
         raise SettingsError(
             "a resumed run keeps its settings: --resume takes no source, task or other settings",
             expected="nothing except the behaviours that it had (--behaviour, --plugin)",
             hint=f"visup watch --resume {run}",
         )
-    return interrupted_run(run, **setting, source=address)
+    return interrupted_run(run, **options, source=address)
 
 
 @takes(WatchSettings, only=("every",), every=2)
 def demo(
-    setting: Given,
+    options: OptionValues,
     out: Annotated[Path | None, typer.Option(help="Run folder (default: demo-run).")] = None,
 ) -> None:
     """Supervise the shipped clip: a capture that fails.
@@ -139,7 +143,7 @@ def demo(
     from visup.runs.demo import demo_settings, free_folder
 
     folder = out or free_folder(Path("demo-run"))
-    result = run_and_report(demo_settings(**setting), Presentation(folder))
+    result = run_and_report(demo_settings(**options), Presentation(folder))
     # The clip shows a failed capture, so that verdict is the demo's success.
     from visup.agent import Verdict
 
@@ -148,7 +152,7 @@ def demo(
 
 def run_and_report(
     settings: WatchSettings,
-    shown: Presentation,
+    presentation: Presentation,
     options: RunOptions | None = None,
     past: InterruptedRun | None = None,
 ) -> RunResult:
@@ -161,25 +165,25 @@ def run_and_report(
     from visup.terminal.narrator import Narrator
 
     console = make_console()
-    narrative = Narrative(Detail.ALL if shown.verbose else Detail.USUAL)
-    narrator = Narrator(console, shown.as_json, narrative)
-    folder = past.recording.path.parent if past else fresh_folder(shown.out, settings.source)
-    silent = shown.quiet or shown.as_json
+    narrative = Narrative(Detail.ALL if presentation.verbose else Detail.USUAL)
+    narrator = Narrator(console, presentation.as_json, narrative)
+    folder = past.recording.path.parent if past else fresh_folder(presentation.out, settings.source)
+    silent = presentation.quiet or presentation.as_json
     # Output to a pipe means that nobody is there to type answers.
     typed = None if silent or not console.is_terminal else typed_lines()
     with progress_bar(console, "watching", shown=not silent) as progress:
         audience = Audience(
-            observers=() if shown.quiet else (narrator,),
+            observers=() if presentation.quiet else (narrator,),
             progress=progress,
-            operator=HumanOperator(shown.all_answers(), typed, console.print),
+            operator=HumanOperator(presentation.all_answers(), typed, console.print),
             notice=None
-            if shown.as_json
+            if presentation.as_json
             else lambda text: console.print(f"[yellow]{escape(text)}[/yellow]", soft_wrap=True),
         )
         with no_empty_folder(folder):
             result = supervise(settings, folder, audience=audience, options=options, past=past)
     narrator.finish()
-    _print_result(console, result, as_json=shown.as_json)
+    _print_result(console, result, as_json=presentation.as_json)
     return result
 
 
@@ -195,12 +199,12 @@ def no_empty_folder(folder: Path) -> Iterator[None]:
 
 
 @contextmanager
-def progress_bar(console: Console, word: str, *, shown: bool = True) -> Iterator[RunProgress]:
+def progress_bar(console: Console, label: str, *, shown: bool = True) -> Iterator[RunProgress]:
     """A progress bar, if the output is a terminal.
 
     Args:
         console: Where to show it.
-        word: What is being done.
+        label: What is being done.
         shown: Whether to show it at all.
 
     Yields:
@@ -209,7 +213,7 @@ def progress_bar(console: Console, word: str, *, shown: bool = True) -> Iterator
     from rich import progress
 
     bar = progress.Progress(
-        word,
+        label,
         progress.BarColumn(),
         progress.MofNCompleteColumn(),
         progress.TextColumn("{task.fields[rate]}"),
@@ -219,11 +223,11 @@ def progress_bar(console: Console, word: str, *, shown: bool = True) -> Iterator
         disable=not (shown and console.is_terminal),
     )
     with bar:
-        task = bar.add_task(word, total=None, rate="")
+        task = bar.add_task(label, total=None, rate="")
 
         def update(done: int, total: int | None, lag_s: float | None = None) -> None:
-            took = bar.tasks[0].elapsed or 0.0
-            bar.update(task, completed=done, total=total, rate=pace_text(done, took, lag_s))
+            elapsed_s = bar.tasks[0].elapsed or 0.0
+            bar.update(task, completed=done, total=total, rate=pace_text(done, elapsed_s, lag_s))
 
         yield update
 
@@ -235,8 +239,8 @@ def pace_text(done: int, took_s: float, lag_s: float | None) -> str:
     '25.0 frames/s, 3.0 s behind'
     """
     rate = f"{done / took_s:.1f} frames/s" if took_s > 1.0 else ""
-    late = f", {lag_s:.1f} s behind" if lag_s is not None and lag_s >= LAG_SHOWN_S else ""
-    return f"{rate}{late}"
+    lag = f", {lag_s:.1f} s behind" if lag_s is not None and lag_s >= MIN_SHOWN_LAG_S else ""
+    return f"{rate}{lag}"
 
 
 def _print_result(console: Console, result: RunResult, *, as_json: bool) -> None:

@@ -132,7 +132,7 @@ def _discs(
         rng.uniform(20, 120, (size[1], size[0])).astype(np.float32), (5, 5), 2
     )
     ys, xs = np.mgrid[: size[1], : size[0]]
-    shots = []
+    labelled_frames = []
     for n in range(frames):
         image = np.array(ground, dtype=np.float64)
         masks: list[NDArray[np.bool_]] = []
@@ -143,7 +143,7 @@ def _discs(
             masks = [m & ~mask for m in masks] + [mask]
         image += rng.normal(0, 1.0, image.shape)
         grey = np.clip(np.rint(image), 0, 255).astype(np.uint8)
-        shots.append(
+        labelled_frames.append(
             LabelledFrame(
                 Frame(n, n / fps, np.repeat(grey[..., None], 3, axis=2)),
                 tuple(
@@ -153,7 +153,7 @@ def _discs(
                 ),
             )
         )
-    return shots
+    return labelled_frames
 
 
 def _velocity(

@@ -50,7 +50,7 @@ class _ClipRun:
     """One run over a clip."""
 
     percepts: list[Percept] = field(default_factory=list)
-    packed: list[bytes] = field(default_factory=list)
+    serialised: list[bytes] = field(default_factory=list)
     times_ms: list[float] = field(default_factory=list)
     errors: list[str] = field(default_factory=list)
     wrote: bool = False
@@ -73,9 +73,9 @@ def check_behaviour(
     Raises:
         AssertionError: It does not; the message lists every check that failed.
     """
-    failed = [f for f in check_results(behaviour, clips=clips, provide=provide) if not f.passed]
+    failed = [r for r in check_results(behaviour, clips=clips, provide=provide) if not r.passed]
     if failed:
-        raise AssertionError("\n".join(f"{f.check}: {f.detail}" for f in failed))
+        raise AssertionError("\n".join(f"{r.check}: {r.detail}" for r in failed))
 
 
 def check_results(
@@ -88,103 +88,105 @@ def check_results(
     make = _maker(behaviour)
     try:
         first = as_behaviour(make(), "the behaviour")
-        shots = {name: clip() for name, clip in CLIPS.items()} | dict(clips or {})
+        all_clips = {name: clip() for name, clip in CLIPS.items()} | dict(clips or {})
         stub_behaviours(first.contract.needs, [], provide)
-    except VisupError as fault:
-        return [CheckResult("it can be plugged in", False, str(fault))]
-    found = [CheckResult("it can be plugged in", True, _declared(first.contract))]
-    outings = {}
-    for name, clip in shots.items():
-        outings[name] = _run_clip(make, clip, provide)
-        errors = outings[name].errors
-        found.append(CheckResult(f"runs on {name}", not errors, errors[0] if errors else ""))
-    found += _contract_results(first.contract, make, shots, outings, provide)
-    return found
+    except VisupError as error:
+        return [CheckResult("it can be plugged in", False, str(error))]
+    results = [CheckResult("it can be plugged in", True, _declared(first.contract))]
+    runs = {}
+    for name, clip in all_clips.items():
+        runs[name] = _run_clip(make, clip, provide)
+        errors = runs[name].errors
+        results.append(CheckResult(f"runs on {name}", not errors, errors[0] if errors else ""))
+    results += _contract_results(first.contract, make, all_clips, runs, provide)
+    return results
 
 
 def _contract_results(
     contract: Contract,
     make: Make,
-    shots: Mapping[str, Sequence[LabelledFrame]],
-    outings: Mapping[str, _ClipRun],
+    clips: Mapping[str, Sequence[LabelledFrame]],
+    runs: Mapping[str, _ClipRun],
     provide: Mapping[str, Script] | None,
 ) -> Iterator[CheckResult]:
-    percepts = [p for outing in outings.values() for p in outing.percepts]
+    percepts = [p for run in runs.values() for p in run.percepts]
     kinds = sorted({p.kind for p in percepts})
-    told = f"{len(percepts)} percepts: {', '.join(kinds)}" if kinds else "nothing, on any clip"
-    yield CheckResult("what it reported", True, told)
-    wrote = [name for name, outing in outings.items() if outing.wrote]
+    summary = f"{len(percepts)} percepts: {', '.join(kinds)}" if kinds else "nothing, on any clip"
+    yield CheckResult("what it reported", True, summary)
+    writers = [name for name, run in runs.items() if run.wrote]
     yield CheckResult(
-        "leaves frames as they are", not wrote, f"it wrote to {wrote}" if wrote else ""
+        "leaves frames as they are", not writers, f"it wrote to {writers}" if writers else ""
     )
-    changed = [name for name, o in outings.items() if o.packed != _packed(o.percepts)]
-    said = f"percepts of earlier frames changed later, on {changed}: report copies"
-    yield CheckResult("leaves what it reported as it is", not changed, said if changed else "")
+    changed = [name for name, o in runs.items() if o.serialised != _serialised(o.percepts)]
+    detail = f"percepts of earlier frames changed later, on {changed}: report copies"
+    yield CheckResult("leaves what it reported as it is", not changed, detail if changed else "")
     if contract.deterministic:
         differs = [
             name
-            for name in shots
-            if _run_clip(make, shots[name], provide).packed != outings[name].packed
+            for name in clips
+            if _run_clip(make, clips[name], provide).serialised != runs[name].serialised
         ]
-        said = f"a second run reported something else on {differs}; or declare deterministic=False"
-        yield CheckResult("is deterministic", not differs, said if differs else "")
+        detail = (
+            f"a second run reported something else on {differs}; or declare deterministic=False"
+        )
+        yield CheckResult("is deterministic", not differs, detail if differs else "")
     if contract.cost_ms is not None:
-        taken = max(median(o.times_ms) for o in outings.values() if o.times_ms)
-        said = f"{taken:.3g} ms a run, declared are {contract.cost_ms:g} ms"
-        yield CheckResult("keeps its budget", taken <= contract.cost_ms, said)
+        median_ms = max(median(o.times_ms) for o in runs.values() if o.times_ms)
+        detail = f"{median_ms:.3g} ms a run, declared are {contract.cost_ms:g} ms"
+        yield CheckResult("keeps its budget", median_ms <= contract.cost_ms, detail)
     if contract.isolate:
-        yield _sendable(make)
+        yield _isolation_result(make)
     if contract.awake:
-        yield _wakes(contract)
+        yield _awake_result(contract)
 
 
-def _wakes(contract: Contract) -> CheckResult:
-    said = "says when it is awake"
+def _awake_result(contract: Contract) -> CheckResult:
+    check = "says when it is awake"
     try:
         activation_rules([contract])
-    except BehaviourError as fault:
-        return CheckResult(said, False, str(fault))
-    return CheckResult(said, True, contract.awake)
+    except BehaviourError as error:
+        return CheckResult(check, False, str(error))
+    return CheckResult(check, True, contract.awake)
 
 
-def _sendable(make: Make) -> CheckResult:
+def _isolation_result(make: Make) -> CheckResult:
     behaviour = make()
     try:
         origin_of(behaviour, behaviour.contract)
-    except BehaviourError as fault:
-        return CheckResult("can be sent to a process of its own", False, str(fault))
+    except BehaviourError as error:
+        return CheckResult("can be sent to a process of its own", False, str(error))
     return CheckResult("can be sent to a process of its own", True)
 
 
 def _run_clip(
-    make: Make, shots: Sequence[LabelledFrame], provide: Mapping[str, Script] | None
+    make: Make, clip: Sequence[LabelledFrame], provide: Mapping[str, Script] | None
 ) -> _ClipRun:
     """Run a fresh behaviour over a clip, here and without limits of time."""
-    outing, behaviour = _ClipRun(), make()
-    own = behaviour.contract.name
-    others = stub_behaviours(behaviour.contract.needs, shots, provide)
-    here = Limits(hang_s=None, in_process=True, never_asleep=frozenset({own}))
-    slots = ordered_slots([*others, behaviour], here)
-    for shot in shots:
-        image = shot.frame.image.copy()
-        frame = Frame(shot.frame.index, shot.frame.time, image)
-        seen = perceive(slots, frame, ())
-        outing.wrote |= bool((image != shot.frame.image).any())
-        report = next(r for r in seen.reports if r.behaviour == own)
+    run, behaviour = _ClipRun(), make()
+    name = behaviour.contract.name
+    providers = stub_behaviours(behaviour.contract.needs, clip, provide)
+    limits = Limits(hang_s=None, in_process=True, never_asleep=frozenset({name}))
+    slots = ordered_slots([*providers, behaviour], limits)
+    for labelled in clip:
+        image = labelled.frame.image.copy()
+        frame = Frame(labelled.frame.index, labelled.frame.time, image)
+        observation = perceive(slots, frame, ())
+        run.wrote |= bool((image != labelled.frame.image).any())
+        report = next(r for r in observation.reports if r.behaviour == name)
         if report.state is ReportState.RAN:
-            outing.times_ms.append(report.elapsed_ms)
-            outing.percepts += report.percepts
-            outing.packed += _packed(report.percepts)
+            run.times_ms.append(report.elapsed_ms)
+            run.percepts += report.percepts
+            run.serialised += _serialised(report.percepts)
         elif report.state is ReportState.FAILED:
-            outing.errors.append(f"frame {frame.index}: {report.error}")
-    return outing
+            run.errors.append(f"frame {frame.index}: {report.error}")
+    return run
 
 
-def _packed(percepts: Sequence[Percept]) -> list[bytes]:
-    return [_bytes(p) for p in percepts]
+def _serialised(percepts: Sequence[Percept]) -> list[bytes]:
+    return [_percept_bytes(p) for p in percepts]
 
 
-def _bytes(percept: Percept) -> bytes:
+def _percept_bytes(percept: Percept) -> bytes:
     try:
         packed: bytes = to_json(encode_percept(percept), inf_nan_mode="constants")
         return packed

@@ -45,9 +45,9 @@ class Scripted:
     ) -> Iterable[Percept]:
         """Report what the script says about one frame, and record the directives for inspection."""
         self.directives.append(tuple(directives))
-        said = self.says(frame)
-        values = said if isinstance(said, list) else [] if said is None else [said]
-        return [self.contract.percept(frame, value) for value in values]
+        value = self.says(frame)
+        values = value if isinstance(value, list) else [] if value is None else [value]
+        return [self.contract.percept(frame, item) for item in values]
 
 
 class ScriptedSource(VideoSource):
@@ -98,7 +98,7 @@ def stub_behaviours(
         BehaviourError: A kind is not known.
     """
     truth = {shot.frame.index: shot for shot in shots}
-    known: dict[str, Script] = {
+    scripts: dict[str, Script] = {
         "region": lambda f: list(truth[f.index].regions),
         "hypothesis": lambda f: [
             Hypothesis(r.id, "disc", 0, 0.9, 0.0, 1.0) for r in truth[f.index].regions
@@ -108,9 +108,9 @@ def stub_behaviours(
         **(provide or {}),
     }
     for kind in kinds:
-        if kind not in known:
+        if kind not in scripts:
             raise BehaviourError(
                 f"the clips have no '{kind}', which the behaviour needs",
                 hint=f"say it: provide={{'{kind}': lambda frame: ...}}",
             )
-    return [Scripted(f"true_{kind}", (kind,), known[kind]) for kind in kinds]
+    return [Scripted(f"true_{kind}", (kind,), scripts[kind]) for kind in kinds]

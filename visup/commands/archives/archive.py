@@ -13,8 +13,8 @@ from visup.archive.chunks.spans import SHORTEST_CHUNK_S, Cutting
 from visup.archive.filling.pool_settings import PoolSettings
 from visup.archive.parallel import Workers
 from visup.commands.archives.calibrate import calibrate
-from visup.commands.archives.lake_argument import Into, LakePlace
-from visup.commands.options import REPLAYED, Given, SettingsFile, takes
+from visup.commands.archives.lake_argument import IntoLake, LakeLocation
+from visup.commands.options import REPLAY_SETTINGS, OptionValues, SettingsFile, takes
 from visup.commands.watch import watch_settings
 from visup.runs.settings import Option, WatchSettings
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from visup.archive.replaying import RunChanges
     from visup.archive.storing.lake_store import LakeStore
 
-FILLED = (
+FILL_SETTINGS = (
     "tasks",
     "models",
     "rules",
@@ -57,7 +57,7 @@ app = typer.Typer(no_args_is_help=True)
 
 
 @dataclass(frozen=True, slots=True)
-class ManyRuns:
+class WorkerOptions:
     """How runs are processed in parallel."""
 
     workers: Workers = None
@@ -87,11 +87,11 @@ class FillOptions:
 
 
 @app.command("run")
-@takes(WatchSettings, PoolSettings, FillOptions, only=FILLED)
+@takes(WatchSettings, PoolSettings, FillOptions, only=FILL_SETTINGS)
 def run(
-    setting: Given,
-    where: Given,
-    wanted: Given,
+    options: OptionValues,
+    pool_options: OptionValues,
+    fill_options: OptionValues,
     sources: Annotated[
         list[str],
         typer.Argument(
@@ -99,7 +99,7 @@ def run(
             help="Clips, folders, patterns ('*.mp4'), URLs, manifests (.csv, .parquet).",
         ),
     ],
-    into: Into,
+    into: IntoLake,
     settings_file: SettingsFile = None,
 ) -> None:
     """Watch many clips on many workers, and store the runs in a lake.
@@ -114,23 +114,24 @@ def run(
     from visup.archive.storing.places import create_lake, is_lake, open_lake, settle, store_of
     from visup.terminal.console import make_console
 
-    console, pool, options = make_console(), PoolSettings(**where), FillOptions(**wanted)
-    settings = watch_settings("", setting, settings_file)
+    console = make_console()
+    pool, filling = PoolSettings(**pool_options), FillOptions(**fill_options)
+    settings = watch_settings("", options, settings_file)
     clips = clips_of(sources)
-    if options.plan:
-        there = open_lake(into) if is_lake(into) else None
+    if filling.plan:
+        existing = open_lake(into) if is_lake(into) else None
         _print_plan(
-            console, into, make_plan(there, clips, settings, options.cutting), pool.processes
+            console, into, make_plan(existing, clips, settings, filling.cutting), pool.processes
         )
         return
     lake, store = create_lake(into), store_of(into)
     with only_filler(lake):
-        clear_attempts(lake, retry=options.retry)
-        todo = make_plan(lake, clips, settings, options.cutting)
-        _print_plan(console, into, todo, pool.processes)
-        result = _filled(console, lake, todo, pool, store)
+        clear_attempts(lake, retry=filling.retry)
+        plan = make_plan(lake, clips, settings, filling.cutting)
+        _print_plan(console, into, plan, pool.processes)
+        result = _fill(console, lake, plan, pool, store)
         settle(lake, store)
-    for text in _closing(result):
+    for text in _closing_lines(result):
         console.print(text, soft_wrap=True, markup=False)
     raise typer.Exit(1 if result.failed else 0)
 
@@ -140,7 +141,7 @@ def add(
     runs: Annotated[
         list[Path], typer.Argument(metavar="RUN...", help="Run folders of `visup watch`.")
     ],
-    into: Into,
+    into: IntoLake,
 ) -> None:
     """Add recorded runs to a lake; runs that are already there are skipped.
 
@@ -155,8 +156,8 @@ def add(
     for folder in runs:
         try:
             key, added = add_run(lake, folder)
-        except VisupError as fault:
-            print_error(str(fault))
+        except VisupError as error:
+            print_error(str(error))
             failed += 1
         else:
             echo(f"{key}  {folder}" if added else f"{key}  {folder} was already there")
@@ -167,7 +168,7 @@ def add(
 
 @app.command("compact")
 def compact(
-    lake: LakePlace,
+    location: LakeLocation,
     now: Annotated[
         bool,
         typer.Option(
@@ -186,15 +187,15 @@ def compact(
     from visup.archive.storing.places import open_lake, store_of
     from visup.terminal.console import echo
 
-    found, store = open_lake(lake), store_of(lake)
-    with only_filler(found):
-        done = compacting.compact(found, grace_s=0.0 if now else compacting.GRACE_S)
+    lake, store = open_lake(location), store_of(location)
+    with only_filler(lake):
+        done = compacting.compact(lake, grace_s=0.0 if now else compacting.GRACE_S)
         if store:
-            store.push(found)
-        merged = _counted(done.joined, "run")
-        parts = f"Merged {merged}; the lake has {_counted(done.partitions, 'partition')}."
-        gone = f" Replaced files of {done.tidied} runs were removed." if done.tidied else ""
-    echo(f"{parts}{gone}")
+            store.push(lake)
+        merged = _plural(done.joined, "run")
+        parts = f"Merged {merged}; the lake has {_plural(done.partitions, 'partition')}."
+        removed = f" Replaced files of {done.tidied} runs were removed." if done.tidied else ""
+    echo(f"{parts}{removed}")
 
 
 app.command("calibrate")(calibrate)
@@ -202,7 +203,7 @@ app.command("calibrate")(calibrate)
 
 @app.command("report")
 def report(
-    lake: LakePlace,
+    location: LakeLocation,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -218,19 +219,19 @@ def report(
     from visup.archive.storing.places import open_lake
     from visup.terminal.console import echo
 
-    path = out or Path("" if is_url(lake) else lake) / "report.html"
-    with open_database(open_lake(lake)) as database:
-        found = lake_statistics(database)
-    write_lake_page(found, Path(lake), path)
-    echo(f"{path}: {_counted(found.runs, 'run')}")
+    path = out or Path("" if is_url(location) else location) / "report.html"
+    with open_database(open_lake(location)) as database:
+        statistics = lake_statistics(database)
+    write_lake_page(statistics, Path(location), path)
+    echo(f"{path}: {_plural(statistics.runs, 'run')}")
 
 
 @app.command("replay")
-@takes(WatchSettings, ManyRuns, only=(*REPLAYED, "workers"))
+@takes(WatchSettings, WorkerOptions, only=(*REPLAY_SETTINGS, "workers"))
 def replay(
-    setting: Given,
-    wanted: Given,
-    lake: LakePlace,
+    options: OptionValues,
+    worker_options: OptionValues,
+    location: LakeLocation,
 ) -> None:
     """Reason again about all runs of a lake, with other rules, tasks or actors, and report what changes.
 
@@ -240,28 +241,28 @@ def replay(
     from visup.archive.storing.places import open_lake
     from visup.terminal.console import make_console
 
-    console, summary, found = make_console(), ChangeSummary(), open_lake(lake)
-    for one in changes(found, found.runs(), **wanted, **setting):
-        summary.take(one)
-        if one.diff:
-            console.print(_changed(one), soft_wrap=True, markup=False)
+    console, summary, lake = make_console(), ChangeSummary(), open_lake(location)
+    for change in changes(lake, lake.runs(), **worker_options, **options):
+        summary.take(change)
+        if change.diff:
+            console.print(_change_line(change), soft_wrap=True, markup=False)
     for text in summary.lines():
         console.print(text, soft_wrap=True, markup=False)
     raise typer.Exit(1 if summary.changed else 0)
 
 
-def _changed(one: RunChanges) -> str:
+def _change_line(change: RunChanges) -> str:
     """What changes in a run, in one line."""
-    lost, gained = one.alerts
+    lost, gained = change.alerts
     parts = [f"{kind}: {lost.get(kind, 0)} lost, {gained.get(kind, 0)} gained"
             for kind in sorted({*lost, *gained})]  # fmt: skip
-    before, after = one.diff.verdicts
+    before, after = change.diff.verdicts
     parts += [f"verdict {before or 'none'} -> {after or 'none'}"] if before != after else []
-    return f"{one.clip}: {'; '.join(parts) or 'other events'} ({one.folder})"
+    return f"{change.clip}: {'; '.join(parts) or 'other events'} ({change.folder})"
 
 
-def _filled(
-    console: Console, lake: Lake, plan: Plan, where: PoolSettings, store: LakeStore | None
+def _fill(
+    console: Console, lake: Lake, plan: Plan, pool_settings: PoolSettings, store: LakeStore | None
 ) -> FillResult:
     """Process the clips that have no run yet, and report on each."""
     from visup.archive.filling.filling import FillResult, fill
@@ -276,7 +277,7 @@ def _filled(
     for warning in check_settings(plan.jobs):
         console.print(warning, style="yellow", soft_wrap=True, markup=False)
     try:
-        with open_pool(where) as pool, _progress(console, plan) as notify:
+        with open_pool(pool_settings) as pool, _progress(console, plan) as notify:
             if pool.dashboard:
                 console.print(f"Dashboard: {pool.dashboard}", soft_wrap=True, markup=False)
             return fill(lake, plan, pool, pushed(store, lake, notify))
@@ -308,8 +309,8 @@ def _progress(console: Console, plan: Plan) -> Iterator[Callable[[ClipOutcome], 
             nonlocal done, video_s
             done, video_s = done + 1, video_s + outcome.video_s
             _print_outcome(console, outcome)
-            took = bar.tasks[0].elapsed or 0.0
-            speed = f"{video_s / took:.1f} s of video per second" if took > 1.0 else ""
+            elapsed_s = bar.tasks[0].elapsed or 0.0
+            speed = f"{video_s / elapsed_s:.1f} s of video per second" if elapsed_s > 1.0 else ""
             bar.update(
                 task,
                 advance=sizes[outcome.run],
@@ -329,8 +330,8 @@ def _print_outcome(console: Console, outcome: ClipOutcome) -> None:
 
 
 def _print_failure(console: Console, failed: FailedClip) -> None:
-    word = "set aside" if failed.put_aside else "failed"
-    text = f"{failed.source}: {word}: {failed.reason}"
+    status = "set aside" if failed.put_aside else "failed"
+    text = f"{failed.source}: {status}: {failed.reason}"
     console.print(text, style="yellow", soft_wrap=True, markup=False)
 
 
@@ -339,26 +340,26 @@ def _print_plan(console: Console, into: str, plan: Plan, workers: int) -> None:
     from visup.archive.storing.places import copy_of
 
     parts = [f"{len(plan.jobs)} to watch ({_size(plan.bytes)})"]
-    cut = [len(job.spans) for job in plan.jobs if job.spans]
-    parts += [f"{len(cut)} of them in {sum(cut)} chunks"] if cut else []
+    chunk_counts = [len(job.spans) for job in plan.jobs if job.spans]
+    parts += [f"{len(chunk_counts)} of them in {sum(chunk_counts)} chunks"] if chunk_counts else []
     parts += [f"{plan.present} already in the lake"] if plan.present else []
     parts += [f"{plan.same} duplicates"] if plan.same else []
     parts += [f"{len(plan.failed)} cannot be watched"] if plan.failed else []
     seconds = estimated_s(copy_of(into), plan.bytes, workers)
     if plan.jobs and seconds is not None:
-        parts.append(f"about {_duration(seconds)} on {_counted(max(1, workers), 'worker')}")
+        parts.append(f"about {_duration(seconds)} on {_plural(max(1, workers), 'worker')}")
     console.print(f"Clips: {', '.join(parts)}.", soft_wrap=True, markup=False)
 
 
-def _closing(result: FillResult) -> Iterator[str]:
+def _closing_lines(result: FillResult) -> Iterator[str]:
     if result.added and result.work_s:
         rate = result.video_s / result.work_s
         yield (
-            f"{_counted(result.added, 'run')} added, {_duration(result.video_s)} of video; "
+            f"{_plural(result.added, 'run')} added, {_duration(result.video_s)} of video; "
             f"each worker watched {rate:.2f} s of video per second."
         )
     if result.failed:
-        yield f"{_counted(len(result.failed), 'clip')} without a run:"
+        yield f"{_plural(len(result.failed), 'clip')} without a run:"
         yield from (f"  {f.source}: {f.reason.splitlines()[0]}" for f in result.failed)
 
 
@@ -368,8 +369,8 @@ def _duration(seconds: float) -> str:
     return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
 
 
-def _counted(count: int, what: str) -> str:
-    return f"{count} {what}" if count == 1 else f"{count} {what}s"
+def _plural(count: int, noun: str) -> str:
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def _size(count: int) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from visup.commands.archives.lake_argument import LakePlace
+from visup.commands.archives.lake_argument import LakeLocation
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -22,7 +22,7 @@ NOT_FITTED = "No settings were fitted; use --fit FILE."
 
 
 def calibrate(
-    lake: LakePlace,
+    location: LakeLocation,
     truth: Annotated[
         Path,
         typer.Option(metavar="FILE", help="Ground truth (CSV): source,verdict,objects,stages."),
@@ -46,21 +46,21 @@ def calibrate(
     from visup.report.page.shell import write_page
     from visup.terminal.console import echo_json
 
-    opened = open_lake(lake)
-    with open_database(opened) as database:
-        known = truth_by_run(database, read_truth(truth))
-        found = reliabilities(database, known)
-    fitted = _fitted(opened, known, fit) if fit else NOT_FITTED
+    lake = open_lake(location)
+    with open_database(lake) as database:
+        truths = truth_by_run(database, read_truth(truth))
+        results = reliabilities(database, truths)
+    fitted = _fit(lake, truths, fit) if fit else NOT_FITTED
     if page:
-        write_page(calibration_page(found, Path(lake), fitted), page)
+        write_page(calibration_page(results, Path(location), fitted), page)
     if as_json:
-        echo_json([asdict(one) for one in found])
+        echo_json([asdict(result) for result in results])
         return
     notes = [fitted] if fit else []
-    _print_figures(found, notes + ([f"Page: {page}"] if page else []))
+    _print_figures(results, notes + ([f"Page: {page}"] if page else []))
 
 
-def _fitted(lake: Lake, known: Mapping[str, RunTruth], path: Path) -> str:
+def _fit(lake: Lake, truths: Mapping[str, RunTruth], path: Path) -> str:
     """Fit the weight of identity votes and write it; returns a sentence about the result."""
     from visup.agent.model.errors import OutputError
     from visup.agent.storage.atomic import write_atomically
@@ -68,45 +68,45 @@ def _fitted(lake: Lake, known: Mapping[str, RunTruth], path: Path) -> str:
     from visup.rules.identity import VoteSettings
     from visup.runs.inputs.settings_file import fitted_settings
 
-    labelled = list(labelled_votes(lake, known))
+    labelled = list(labelled_votes(lake, truths))
     evidence = fitted_evidence(labelled)
     if evidence is None:
         return f"{len(labelled)} objects are labelled; fitting the weight of votes takes at least {FEWEST}."
-    how = (
+    comment = (
         f"Weight of a vote for an identity, fitted to {len(labelled)} labelled objects;"
         f" the default is {VoteSettings().evidence:g}."
     )
     try:
-        write_atomically(path, fitted_settings(evidence, how).encode())
-    except OSError as fault:
-        reason = fault.strerror or str(fault)
-        raise OutputError(f"the settings cannot be written ({reason})", where=str(path)) from fault
-    return f"{how} Fitted: {evidence:.3f}, written to {path}."
+        write_atomically(path, fitted_settings(evidence, comment).encode())
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise OutputError(f"the settings cannot be written ({reason})", where=str(path)) from error
+    return f"{comment} Fitted: {evidence:.3f}, written to {path}."
 
 
-def _print_figures(found: Sequence[Reliability], notes: Sequence[str]) -> None:
+def _print_figures(results: Sequence[Reliability], notes: Sequence[str]) -> None:
     """Print a summary and a table of each kind of statement, then the notes."""
     from visup.terminal.console import make_console
 
     console = make_console()
-    for one in found:
-        console.print(_summary(one), soft_wrap=True, markup=False)
-        console.print(_reliability_table(one))
+    for result in results:
+        console.print(_summary(result), soft_wrap=True, markup=False)
+        console.print(_reliability_table(result))
     for text in notes:
         console.print(text, soft_wrap=True, markup=False)
 
 
-def _summary(one: Reliability) -> str:
+def _summary(result: Reliability) -> str:
     return (
-        f"Statements about {one.kind}: {one.count}, of which {one.right:.0%} right;"
-        f" calibration error {one.error:.3f}, Brier score {one.brier:.3f}"
+        f"Statements about {result.kind}: {result.count}, of which {result.right:.0%} right;"
+        f" calibration error {result.error:.3f}, Brier score {result.brier:.3f}"
     )
 
 
-def _reliability_table(one: Reliability) -> Table:
+def _reliability_table(result: Reliability) -> Table:
     from visup.terminal.tables import table
 
-    shown = table("count", "confidence", "right")
-    for b in one.bins:
-        shown.add_row(f"{b['count']:.0f}", f"{b['confidence']:.2f}", f"{b['right']:.2f}")
-    return shown
+    rows = table("count", "confidence", "right")
+    for bin_ in result.bins:
+        rows.add_row(f"{bin_['count']:.0f}", f"{bin_['confidence']:.2f}", f"{bin_['right']:.2f}")
+    return rows

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from visup.archive.parallel import Workers
-from visup.commands.archives.lake_argument import LakePlace
-from visup.commands.options import Given, takes
+from visup.commands.archives.lake_argument import LakeLocation
+from visup.commands.options import OptionValues, takes
 from visup.runs.settings import Option
 
 if TYPE_CHECKING:
@@ -45,9 +45,9 @@ class FindOptions:
 
 @takes(FindOptions)
 def find(
-    wanted: Given,
-    lake: LakePlace,
-    what: Annotated[
+    find_options: OptionValues,
+    location: LakeLocation,
+    condition: Annotated[
         str,
         typer.Argument(
             metavar="CONDITION",
@@ -60,25 +60,25 @@ def find(
     Runs whose recorded relations rule the condition out are skipped. Exit code: 0 if there are hits, 1 if
     there are none, 2 for bad input.
     """
-    from visup.archive.finding.search import find as look
+    from visup.archive.finding.search import find as find_runs
     from visup.archive.finding.search import read_search
     from visup.archive.querying.database import open_database
     from visup.archive.storing.places import open_lake
     from visup.terminal.console import make_console
 
-    options, found, console = FindOptions(**wanted), open_lake(lake), make_console()
-    search, runs = read_search(what, unknown=options.unknown), found.runs()
-    with open_database(found) as database:
+    options, lake, console = FindOptions(**find_options), open_lake(location), make_console()
+    search, runs = read_search(condition, unknown=options.unknown), lake.runs()
+    with open_database(lake) as database:
         possible = runs if options.scan_all else search.possible_runs(database)
-    counts = _print_found(console, look(found, search, possible, options.workers), options)
+    counts = _print_runs(console, find_runs(lake, search, possible, options.workers), options)
     if not options.as_json:
         share = f" ({100 * counts.runs / len(runs):.0f} %)" if runs else ""
-        left = (
+        unsearched = (
             "" if counts.runs == len(possible) else f"; not searched: {len(possible) - counts.runs}"
         )
         console.print(
             f"Hits: {counts.hits}, in {counts.hit_runs} of {len(runs)} runs;"
-            f" searched: {counts.runs}{share}{left}."
+            f" searched: {counts.runs}{share}{unsearched}."
         )
     raise typer.Exit(0 if counts.hits else 1)
 
@@ -92,15 +92,15 @@ class _Counts:
     hits: int = 0
 
 
-def _print_found(console: Console, found: Iterable[FoundRun], options: FindOptions) -> _Counts:
+def _print_runs(console: Console, found_runs: Iterable[FoundRun], options: FindOptions) -> _Counts:
     """Print each run, until enough have hits."""
     counts = _Counts()
-    for each in found:
-        _print_run(console, each, options.as_json)
-        counts.runs, counts.hits = counts.runs + 1, counts.hits + len(each.hits)
-        counts.hit_runs += bool(each.hits)
-        if each.hits and options.clips:
-            _cut(None if options.as_json else console, each, options.clips)
+    for found in found_runs:
+        _print_run(console, found, options.as_json)
+        counts.runs, counts.hits = counts.runs + 1, counts.hits + len(found.hits)
+        counts.hit_runs += bool(found.hits)
+        if found.hits and options.clips:
+            _cut(None if options.as_json else console, found, options.clips)
         if counts.hit_runs == options.first:
             break
     return counts
@@ -116,8 +116,8 @@ def _cut(console: Console | None, found: FoundRun, folder: Path) -> None:
         for path in cut_hits(found.clip, found.run, found.hits, folder):
             if console:
                 console.print(f"  video: {path}", soft_wrap=True, markup=False, style="dim")
-    except SourceError as fault:
-        print_error(str(fault))
+    except SourceError as error:
+        print_error(str(error))
 
 
 def _print_run(console: Console, found: FoundRun, as_json: bool) -> None:
@@ -126,8 +126,8 @@ def _print_run(console: Console, found: FoundRun, as_json: bool) -> None:
 
     if as_json:
         for hit in found.hits:
-            where = {"run": found.run, "clip": found.clip, "folder": str(found.folder)}
-            echo_json({**where, **to_jsonable(hit)}, sort_keys=True)
+            identity = {"run": found.run, "clip": found.clip, "folder": str(found.folder)}
+            echo_json({**identity, **to_jsonable(hit)}, sort_keys=True)
         return
     if found.hits:
         console.print(f"{found.clip}", style="bold", soft_wrap=True, markup=False)
@@ -145,9 +145,9 @@ def _print_run(console: Console, found: FoundRun, as_json: bool) -> None:
 
 def _lines(hits: tuple[Hit, ...]) -> Iterator[str]:
     for hit in hits:
-        who = ", ".join(f"{n} ({i})" for n, i in zip(hit.names, hit.objects, strict=True))
-        sure = "" if hit.confidence is None else f", confidence {hit.confidence:.2f}"
-        word = ", unknown" if hit.truth == "unknown" else ""
+        objects = ", ".join(f"{n} ({i})" for n, i in zip(hit.names, hit.objects, strict=True))
+        confidence = "" if hit.confidence is None else f", confidence {hit.confidence:.2f}"
+        truth = ", unknown" if hit.truth == "unknown" else ""
         end = f"{hit.end:.1f} s" + (" (the end)" if hit.open else "")
         rule = f"{hit.rule}: " if hit.rule else ""
-        yield f"{rule}{hit.begin:.1f} to {end}: {who or 'no particular object'}{sure}{word}"
+        yield f"{rule}{hit.begin:.1f} to {end}: {objects or 'no particular object'}{confidence}{truth}"

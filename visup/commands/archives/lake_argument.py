@@ -6,10 +6,10 @@ from typing import Annotated
 
 import typer
 
-LakePlace = Annotated[
+LakeLocation = Annotated[
     str, typer.Argument(metavar="LAKE", help="A lake made by `visup archive`: a folder or a URL.")
 ]
-Into = Annotated[
+IntoLake = Annotated[
     str,
     typer.Option(
         "--into", metavar="LAKE", help="The lake, a folder or URL; created if it does not exist."

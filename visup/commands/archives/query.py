@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from visup.commands.archives.lake_argument import LakePlace
-from visup.commands.options import Given, takes
+from visup.commands.archives.lake_argument import LakeLocation
+from visup.commands.options import OptionValues, takes
 from visup.runs.settings import Option
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from visup.archive.querying.database import LakeDatabase
 
-SHOWN_ROWS = 50
+MAX_SHOWN_ROWS = 50
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +43,8 @@ class AnswerOptions:
 
 @takes(AnswerOptions)
 def query(
-    wanted: Given,
-    lake: LakePlace,
+    answer_options: OptionValues,
+    location: LakeLocation,
     sql: Annotated[
         str | None, typer.Argument(metavar="SQL", help="One SELECT, in the SQL of DuckDB.")
     ] = None,
@@ -58,12 +58,12 @@ def query(
     from visup.archive.storing.places import open_lake
     from visup.terminal.console import echo, echo_json, make_console
 
-    options = AnswerOptions(**wanted)
+    options = AnswerOptions(**answer_options)
     if not (sql or options.tables or options.examples):
         raise typer.BadParameter("give a query, or see --examples", param_hint="SQL")
     form = format_of(options.form, options.out)
     console = make_console(unwrapped=True)
-    with open_database(open_lake(lake), options.memory_gb) as database:
+    with open_database(open_lake(location), options.memory_gb) as database:
         if options.tables:
             _show_tables(console, database)
         if options.examples:
@@ -93,12 +93,12 @@ def _show(console: Console, answer: pa.Table) -> None:
     if not answer.num_rows:
         console.print(f"No rows ({', '.join(answer.column_names)}).", markup=False, soft_wrap=True)
         return
-    shown = table(*map(escape, answer.column_names))
-    head = answer.slice(0, SHOWN_ROWS)
+    rows = table(*map(escape, answer.column_names))
+    head = answer.slice(0, MAX_SHOWN_ROWS)
     columns = [column.to_pylist() for column in head.columns]
     for row in zip(*columns, strict=True):
-        shown.add_row(*(Text(cell(value)) for value in row))
-    console.print(shown)
+        rows.add_row(*(Text(cell(value)) for value in row))
+    console.print(rows)
     more = answer.num_rows - head.num_rows
     if more > 0:
         console.print(f"and {more} more rows; --format csv shows all", markup=False)

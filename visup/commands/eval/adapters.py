@@ -21,10 +21,10 @@ def shapes_closing(figures: Figures) -> Iterator[str]:
 
 def clips(names: list[str] | None, cache: Path, progress: Progress) -> Figures:
     """Evaluate rendered clips against their thresholds."""
-    from visup.commands.render import needs_renderer
+    from visup.commands.render import require_renderer
     from visup.evaluation.motion.rendered_clips import evaluate_clips
 
-    needs_renderer()
+    require_renderer()
     return evaluate_clips(cache, names or (), progress=progress)
 
 
@@ -76,37 +76,37 @@ def machines_closing(figures: Figures) -> Iterator[RenderableType]:
     if "baseline" in figures:
         rows = {n: i["baseline"] for n, i in figures["items"].items()}
         keys = ("verdict", "verdicts_right", "stage_f1", "actors", "contact_f1", "move_f1", "ms")
-        shown = {"items": rows, "total": figures["baseline"]}
-        yield from figures_tables("baseline: CSRT on the taught boxes", shown, keys)
+        baseline = {"items": rows, "total": figures["baseline"]}
+        yield from figures_tables("baseline: CSRT on the taught boxes", baseline, keys)
     total = figures["total"]
     yield f"{total['verdicts_right']} of {total['verdicts']} verdicts are right"
 
 
 def random_worlds(kind: list[str] | None, progress: Progress, **settings: Any) -> Figures:
     """Evaluate random worlds."""
-    from visup.commands.render import needs_renderer
+    from visup.commands.render import require_renderer
     from visup.evaluation.machines.random_worlds import evaluate_random
 
-    needs_renderer()
+    require_renderer()
     return evaluate_random(kinds=kind or (), progress=progress, **settings)
 
 
 def learning(kind: list[str] | None, progress: Progress, **settings: Any) -> Figures:
     """Evaluate tasks learned from runs."""
-    from visup.commands.render import needs_renderer
+    from visup.commands.render import require_renderer
     from visup.evaluation.learning.runner import evaluate_learning
 
-    needs_renderer()
+    require_renderer()
     return evaluate_learning(kinds=kind or (), progress=progress, **settings)
 
 
 def learning_closing(figures: Figures) -> Iterator[str]:
     """The runs that are judged wrong, and how many missions meet the threshold."""
-    for kind, found in figures["items"].items():
-        if found["wrong"]:
-            yield f"{kind}: judged wrong: {', '.join(found['wrong'])}"
-        if "failed" in found:
-            yield f"{kind}: {found['failed']}"
+    for kind, item in figures["items"].items():
+        if item["wrong"]:
+            yield f"{kind}: judged wrong: {', '.join(item['wrong'])}"
+        if "failed" in item:
+            yield f"{kind}: {item['failed']}"
     yield "{held} of {missions} missions hold the bar".format(**figures["total"])
 
 
@@ -120,17 +120,17 @@ def random_closing(figures: Figures) -> Iterator[str]:
     for name, world in figures["worlds"].items():
         if not world["verdicts_right"]:
             yield f"{name}: {world['verdict']}, not {' or '.join(world['accept'])}"
-    for who, total in (("visup", figures["total"]), ("CSRT", figures.get("baseline"))):
+    for name, total in (("visup", figures["total"]), ("CSRT", figures.get("baseline"))):
         if total:
-            yield f"{who}: {total['verdicts_right']} of {total['verdicts']} verdicts are right"
+            yield f"{name}: {total['verdicts_right']} of {total['verdicts']} verdicts are right"
 
 
 def random_orbits(progress: Progress, **settings: Any) -> Figures:
     """Evaluate random missions in orbit."""
-    from visup.commands.render import needs_renderer
+    from visup.commands.render import require_renderer
     from visup.evaluation.missions.random_orbits import evaluate_orbits
 
-    needs_renderer()
+    require_renderer()
     return evaluate_orbits(progress=progress, **settings)
 
 
@@ -166,11 +166,11 @@ def reasoning_closing(figures: Figures) -> Iterator[RenderableType]:
         yield reliability_table(figures)
 
 
-def relations_settings(given: dict[str, Any]) -> dict[str, Any]:
+def relations_settings(options: dict[str, Any]) -> dict[str, Any]:
     """The options of `visup eval relations`, and the fixed settings."""
     from visup.evaluation.oracles import oracle
 
-    return {**given, **oracle("reasoning.relations").settings_of_record()}
+    return {**options, **oracle("reasoning.relations").settings_of_record()}
 
 
 def relations_closing(figures: Figures) -> Iterator[str]:
@@ -206,10 +206,10 @@ def recognition(grammars: int, tasks: int, seed: int, progress: Progress) -> Fig
     """Evaluate the recognition of random tasks against its thresholds."""
     from visup.evaluation.oracles import oracle
 
-    figures, bars = oracle("reasoning.recognition").evaluate_recognition(
+    figures, thresholds = oracle("reasoning.recognition").evaluate_recognition(
         grammars, tasks, seed, progress
     )
-    return {"total": figures, "items": {}, "bars": bars}
+    return {"total": figures, "items": {}, "bars": thresholds}
 
 
 def recognition_closing(figures: Figures) -> Iterator[RenderableType]:
@@ -217,8 +217,8 @@ def recognition_closing(figures: Figures) -> Iterator[RenderableType]:
     from visup.commands.eval.tables import totals_table
 
     yield totals_table(figures)
-    for bar, held in figures["bars"].items():
-        yield f"{'held' if held else 'MISSED'}: {bar}"
+    for threshold, met in figures["bars"].items():
+        yield f"{'held' if met else 'MISSED'}: {threshold}"
 
 
 def tasks_closing(figures: Figures) -> Iterator[RenderableType]:
@@ -281,12 +281,12 @@ def stepping_failed(figures: Figures) -> bool:
     return bool(missed(dict(figures)))
 
 
-def failures_closing(form: str) -> Callable[[Figures], Iterator[str]]:
+def failures_closing(template: str) -> Callable[[Figures], Iterator[str]]:
     """A function that lists the first failures, each in a format."""
 
     def closing(figures: Figures) -> Iterator[str]:
         for failure in figures["failures"][:20]:
-            yield form.format(**failure)
+            yield template.format(**failure)
 
     return closing
 
@@ -306,8 +306,8 @@ def any_failures(figures: Figures) -> bool:
 def archive_closing(figures: Figures) -> Iterator[str]:
     """One line for each part."""
     for name, part in figures["items"].items():
-        shown = (f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in part.items())
-        yield f"{name}: {', '.join(shown)}"
+        values = (f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in part.items())
+        yield f"{name}: {', '.join(values)}"
 
 
 def anything_different(figures: Figures) -> bool:

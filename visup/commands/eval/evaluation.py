@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from visup.commands.options import Given, Setting
+from visup.commands.options import OptionValues, Setting
 from visup.runs.settings import Option
 from visup.terminal.console import make_console
 
@@ -53,13 +53,13 @@ class EvaluationCommand:
     argument: Parameter | None = None
     closing: Callable[[Figures], Iterator[RenderableType]] = field(default=lambda _: iter(()))
     failed: Callable[[Figures], bool] = field(default=lambda _: False)
-    recorded: Callable[[Given], Given] = field(default=dict)
+    recorded: Callable[[OptionValues], OptionValues] = field(default=dict)
 
     def command(self) -> Callable[..., None]:
         """The function from which typer makes a command."""
 
-        def run(json_file: Path | None, **given: Any) -> None:
-            self._run(json_file, given)
+        def run(json_file: Path | None, **options: Any) -> None:
+            self._run(json_file, options)
 
         run.__doc__ = self.about
         parameters = [self.argument] if self.argument else []
@@ -68,21 +68,21 @@ class EvaluationCommand:
         run.__annotations__ = {}
         return run
 
-    def _run(self, json_file: Path | None, given: Given) -> None:
+    def _run(self, json_file: Path | None, options: OptionValues) -> None:
 
         from visup.commands.eval.figures_table import figures_tables
         from visup.evaluation.oracles import evaluation_module
         from visup.evaluation.record import write_record
 
-        folder = given.get("folder")
+        folder = options.get("folder")
         _check_paths(folder, json_file)
         module, _, function = self.function.partition(":")
         with _progress_line(self.verb) as progress:
-            figures = getattr(evaluation_module(module), function)(**given, progress=progress)
+            figures = getattr(evaluation_module(module), function)(**options, progress=progress)
         if (
             json_file
         ):  # written first: hours of work must not be lost if the table cannot be printed
-            settings = {k: v for k, v in given.items() if k != "folder"}
+            settings = {k: v for k, v in options.items() if k != "folder"}
             write_record(json_file, figures, self.recorded(settings))
         console = make_console()
         if self.keys:

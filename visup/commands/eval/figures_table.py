@@ -11,7 +11,7 @@ Rows = Mapping[str, Mapping[str, Any]]
 Cells = Mapping[str, Mapping[str, str]]
 
 WIDTH = 80
-LONGEST_NAME = 26
+MAX_NAME_LENGTH = 26
 """Characters; longer names of items are wrapped."""
 
 HEADINGS = {
@@ -22,7 +22,7 @@ HEADINGS = {
 }
 """Headings that are shorter than the keys in the file of figures."""
 
-SHORT_WORDS = {"interrupted": "interr.", "in_progress": "in pr.", "succeeded": "succ."}
+ABBREVIATIONS = {"interrupted": "interr.", "in_progress": "in pr.", "succeeded": "succ."}
 """Abbreviated verdicts, used where the full words do not fit."""
 
 
@@ -38,44 +38,49 @@ def figures_tables(title: str, figures: Mapping[str, Any], keys: Sequence[str]) 
         keys: The figures, in order; those that no item has are left out.
     """
     rows: Rows = {**figures["items"], "total": figures["total"]}
-    shown = [k for k in keys if any(k in row for row in rows.values())]
-    for cells in (_cells(rows, shown, {}), _cells(rows, shown, SHORT_WORDS)):
-        if _fits([_name_width(rows), *_widths(cells, shown)]):
-            yield _wide(title, cells, shown)
+    present_keys = [k for k in keys if any(k in row for row in rows.values())]
+    for cells in (_cells(rows, present_keys, {}), _cells(rows, present_keys, ABBREVIATIONS)):
+        if _fits([_name_width(rows), *_widths(cells, present_keys)]):
+            yield _wide_table(title, cells, present_keys)
             return
-        if len(rows) <= len(shown) and _fits([max(map(len, shown)), *_turned_widths(cells, shown)]):
-            yield _tall(title, cells, shown)
+        if len(rows) <= len(present_keys) and _fits(
+            [max(map(len, present_keys)), *_transposed_widths(cells, present_keys)]
+        ):
+            yield _transposed_table(title, cells, present_keys)
             return
-    for number, part in enumerate(_parts(cells, shown)):
-        yield _wide(f"{title} (continued)" if number else title, cells, part)
+    for number, part in enumerate(_parts(cells, present_keys)):
+        yield _wide_table(f"{title} (continued)" if number else title, cells, part)
 
 
-def _cells(rows: Rows, keys: Sequence[str], short: Mapping[str, str]) -> Cells:
-    return {name: {k: _cell(row.get(k), short) for k in keys} for name, row in rows.items()}
+def _cells(rows: Rows, keys: Sequence[str], abbreviations: Mapping[str, str]) -> Cells:
+    return {name: {k: _cell(row.get(k), abbreviations) for k in keys} for name, row in rows.items()}
 
 
-def _cell(value: object, short: Mapping[str, str]) -> str:
+def _cell(value: object, abbreviations: Mapping[str, str]) -> str:
     if value is None:
         return ""
     if isinstance(value, float):
         return f"{value:.3f}" if abs(value) < 10 else f"{value:.1f}"
-    return short.get(str(value), str(value))
+    return abbreviations.get(str(value), str(value))
 
 
-def _words(key: str) -> list[str]:
+def _heading_words(key: str) -> list[str]:
     return HEADINGS.get(key, key.replace("_", " ")).split()
 
 
 def _name_width(rows: Mapping[str, object]) -> int:
-    return min(LONGEST_NAME, max(map(len, rows)))
+    return min(MAX_NAME_LENGTH, max(map(len, rows)))
 
 
 def _widths(cells: Cells, keys: Sequence[str]) -> list[int]:
     """Width of each figure's column: its widest cell, or the longest word of its heading."""
-    return [max(len(text) for text in (*_words(k), *(c[k] for c in cells.values()))) for k in keys]
+    return [
+        max(len(text) for text in (*_heading_words(k), *(c[k] for c in cells.values())))
+        for k in keys
+    ]
 
 
-def _turned_widths(cells: Cells, keys: Sequence[str]) -> list[int]:
+def _transposed_widths(cells: Cells, keys: Sequence[str]) -> list[int]:
     """Width of each item's column, when figures are rows."""
     return [max(5, *(len(row[k]) for k in keys)) for row in cells.values()]
 
@@ -96,12 +101,12 @@ def _parts(cells: Cells, keys: Sequence[str]) -> Iterator[list[str]]:
     yield part
 
 
-def _wide(title: str, cells: Cells, keys: Sequence[str]) -> Table:
+def _wide_table(title: str, cells: Cells, keys: Sequence[str]) -> Table:
     table = _table(title)
     table.add_column("", overflow="fold", width=_name_width(cells))
     # Explicit widths: by default, rich fits whole headings at the cost of the cells.
     for key, width in zip(keys, _widths(cells, keys), strict=True):
-        table.add_column(" ".join(_words(key)), justify="right", width=width)
+        table.add_column(" ".join(_heading_words(key)), justify="right", width=width)
     for name, row in cells.items():
         if name == "total":
             table.add_section()
@@ -109,7 +114,7 @@ def _wide(title: str, cells: Cells, keys: Sequence[str]) -> Table:
     return table
 
 
-def _tall(title: str, cells: Cells, keys: Sequence[str]) -> Table:
+def _transposed_table(title: str, cells: Cells, keys: Sequence[str]) -> Table:
     """Figures as rows; items as numbered columns, with their names below."""
     names = [name for name in cells if name != "total"]
     table = _table(title)

@@ -154,7 +154,7 @@ MACHINERY_EVALUATIONS = (
         ),
         folder_argument("A mission, or a folder of missions."),
         adapters.reasoning_closing,
-        recorded=lambda given: {k: v for k, v in given.items() if k != "jobs"},
+        recorded=lambda options: {k: v for k, v in options.items() if k != "jobs"},
     ),
     EvaluationCommand(
         "tasks",

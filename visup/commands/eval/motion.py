@@ -28,8 +28,8 @@ def motion(folder: Path, folds: int | None, progress: Progress, **options: Any) 
     from visup.agent.model.errors import SettingsError
     from visup.evaluation.motion.runner import evaluate_motion
 
-    alone = {"--try": "tries", "--stability": "stability", "--against": "against"}
-    for option, name in (alone | {"--train": "train", "--also": "also"}).items():
+    fold_options = {"--try": "tries", "--stability": "stability", "--against": "against"}
+    for option, name in (fold_options | {"--train": "train", "--also": "also"}).items():
         if options[name]:
             raise SettingsError(
                 f"{option} has no effect without folds", expected="--folds N with it"
@@ -37,14 +37,14 @@ def motion(folder: Path, folds: int | None, progress: Progress, **options: Any) 
     return evaluate_motion(folder, limit=options["limit"], progress=progress)
 
 
-def motion_settings(given: dict[str, Any]) -> dict[str, Any]:
+def motion_settings(options: dict[str, Any]) -> dict[str, Any]:
     """The options of `visup eval motion` that affect its figures."""
-    by_folds = (
+    fold_options = (
         ("folds", "tries", "stability", "train", "also", "seed")
-        if given["folds"] is not None
+        if options["folds"] is not None
         else ()
     )
-    return {k: given[k] for k in ("limit", *by_folds)}
+    return {k: options[k] for k in ("limit", *fold_options)}
 
 
 def motion_closing(figures: Figures) -> Iterator[str]:
@@ -57,10 +57,10 @@ def motion_closing(figures: Figures) -> Iterator[str]:
         f"{total['families']} families; {total['weak']} below 0.25"
     )
     if "gain" in total:
-        kept = total["gain"] > total["gain_spread"]
+        significant = total["gain"] > total["gain_spread"]
         yield (
             f"gain {total['gain']:+.3f} +- {total['gain_spread']:.3f}: "
-            f"{'more' if kept else 'no more'} than its spread"
+            f"{'more' if significant else 'no more'} than its spread"
         )
     if "unstable" in total:
         yield (

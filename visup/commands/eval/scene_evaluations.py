@@ -197,7 +197,7 @@ SCENE_EVALUATIONS = (
         _CLIP_NAMES,
         adapters.clips_closing,
         lambda figures: figures["total"]["passed"] < figures["total"]["clips"],
-        lambda given: {"clips": given["names"] or "all"},
+        lambda options: {"clips": options["names"] or "all"},
     ),
     EvaluationCommand(
         "crowds",

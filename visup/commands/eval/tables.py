@@ -10,7 +10,7 @@ from rich.text import Text
 
 Rows = Mapping[str, Mapping[str, Any]]
 
-_WORST = 6
+_HARDEST_COUNT = 6
 
 
 def totals_table(figures: Mapping[str, Any]) -> Table:
@@ -48,14 +48,14 @@ def clips_table(items: Rows) -> Table:
     return table
 
 
-def _clip_rows(name: str, item: Mapping[str, Any]) -> Iterator[tuple[str | Text, ...]]:
+def _clip_rows(clip: str, item: Mapping[str, Any]) -> Iterator[tuple[str | Text, ...]]:
     missed = "; ".join(item["missed"])
     verdict = Text(missed, "red") if missed else Text("pass", "green")
-    first: tuple[str | Text, ...] = (name, f"{item.get('ghost', 0.0):.1%}", verdict)
-    for thing, o in list(item.get("objects", {}).items()) or [("", {})]:
+    cells: tuple[str | Text, ...] = (clip, f"{item.get('ghost', 0.0):.1%}", verdict)
+    for name, o in list(item.get("objects", {}).items()) or [("", {})]:
         scores = (f"{o['J']:.3f}", str(o["id_switches"])) if o else ("", "")
-        yield (first[0], thing, *scores, *first[1:])
-        first = ("", "", "")
+        yield (cells[0], name, *scores, *cells[1:])
+        cells = ("", "", "")
 
 
 def views_table(total: Mapping[str, Any]) -> Table:
@@ -64,8 +64,8 @@ def views_table(total: Mapping[str, Any]) -> Table:
 
     baseline = total["baseline"]
     table = Table(title="views", title_justify="left")
-    own = ("top1", "top5", "angle", "known told", "strangers told", "ms")
-    for heading in ("", *own, *(f"{name} top1" for name in baseline)):
+    headings = ("top1", "top5", "angle", "known told", "strangers told", "ms")
+    for heading in ("", *headings, *(f"{name} top1" for name in baseline)):
         table.add_column(heading, justify="right" if heading else "left")
     for condition in CONDITIONS:
         row = total[condition]
@@ -85,5 +85,5 @@ def hardest_views(items: Rows) -> str:
         name: sum(row[c]["top1"] for c in CONDITIONS) / len(CONDITIONS)
         for name, row in items.items()
     }
-    worst = sorted(shares, key=lambda name: shares[name])[:_WORST]
-    return "hardest: " + ", ".join(f"{name} {shares[name]:.2f}" for name in worst)
+    hardest = sorted(shares, key=lambda name: shares[name])[:_HARDEST_COUNT]
+    return "hardest: " + ", ".join(f"{name} {shares[name]:.2f}" for name in hardest)

@@ -22,7 +22,7 @@ VIEWER_VARIABLE = "VISUP_CONSOLE_VIEWER_TOKEN"
 PARENT_VARIABLE = "VISUP_CONSOLE_WITH_PARENT"
 """Set by a process that starts the console, which then ends with that process and runs at low priority."""
 
-SHORTEST_TOKEN = 16
+MIN_TOKEN_LENGTH = 16
 
 SaveTo = Annotated[
     Path | None,
@@ -31,7 +31,7 @@ SaveTo = Annotated[
 
 
 def console(
-    places: Annotated[
+    paths: Annotated[
         list[Path], typer.Argument(metavar="RUN...", help="Run folders, or folders of them.")
     ],
     host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
@@ -56,12 +56,12 @@ def console(
         from visup.console.library import RunLibrary
         from visup.console.server import serve_console
         from visup.console.state import ConsoleState
-    except ModuleNotFoundError as missing:
-        raise ExtraMissingError("the console", "console") from missing
-    _check_reach(host)
+    except ModuleNotFoundError as error:
+        raise ExtraMissingError("the console", "console") from error
+    _check_host(host)
     if save_to is not None and not save_to.is_dir():
         raise SettingsError("the folder to save to does not exist", where=str(save_to))
-    state = ConsoleState(RunLibrary(places), save_to)
+    state = ConsoleState(RunLibrary(paths), save_to)
     access = _access((*LOOPBACK, host, *(name or ())))
     out = make_console(soft_wrap=True)
     if os.environ.get(PARENT_VARIABLE):
@@ -89,7 +89,7 @@ def _end_with_parent() -> None:
         os.nice(5)
 
 
-def _check_reach(host: str) -> None:
+def _check_host(host: str) -> None:
     """Refuse a host that others can reach unless the user has set a token."""
     from visup.console.access import LOOPBACK
 
@@ -114,9 +114,9 @@ def _access(hosts: tuple[str, ...]) -> Access:
 
 def _token(name: str) -> str | None:
     token = os.environ.get(name)
-    if token is not None and (len(token) < SHORTEST_TOKEN or not token.isascii()):
+    if token is not None and (len(token) < MIN_TOKEN_LENGTH or not token.isascii()):
         raise SettingsError(
             f"the token in {name} is too short, or not plain ASCII",
-            expected=f"at least {SHORTEST_TOKEN} letters and digits",
+            expected=f"at least {MIN_TOKEN_LENGTH} letters and digits",
         )
     return token

@@ -19,20 +19,20 @@ SiteFile = Annotated[Path, typer.Argument(metavar="SITE.toml", help="The site fi
 RUN = "run"
 
 
-class SiteFirst(TyperGroup):
+class SiteGroup(TyperGroup):
     """Commands about sites; any other first word is a site file to watch."""
 
     default_command = RUN
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Insert `run` before the name of a site file."""
-        named = next((word for word in args if not word.startswith("-")), None)
-        if named is not None and named not in self.commands:
+        first_word = next((word for word in args if not word.startswith("-")), None)
+        if first_word is not None and first_word not in self.commands:
             args = [RUN, *args]
         return super().parse_args(ctx, args)
 
 
-app = typer.Typer(no_args_is_help=True, cls=SiteFirst)
+app = typer.Typer(no_args_is_help=True, cls=SiteGroup)
 
 
 @app.command(RUN)
@@ -94,13 +94,13 @@ def check(
     for line in load_lines(checks):
         echo(line)
     refused = [c.camera.name for c in checks if c.fault]
-    if fault := store_fault(site):
-        print_error(fault)
+    if store_error := store_fault(site):
+        print_error(store_error)
     if refused:
         print_error(
             f"{len(refused)} of {len(checks)} cameras cannot be watched: {', '.join(refused)}"
         )
-    if refused or fault:
+    if refused or store_error:
         raise typer.Exit(ExitCode.BAD_INPUT)
     echo(f"All {len(checks)} cameras can be watched." if len(checks) > 1 else "It can be watched.")
 

@@ -45,8 +45,8 @@ def _write(file: str, text: str) -> None:
         raise TaskError("this task ships with visup and cannot be changed", where=file)
     try:
         Path(file).write_text(text, encoding="utf-8")
-    except OSError as e:
-        raise OutputError(f"cannot be written: {e.strerror or e}", where=file) from e
+    except OSError as error:
+        raise OutputError(f"cannot be written: {error.strerror or error}", where=file) from error
 
 
 def formatted_source(text: str, file: str) -> str:
@@ -63,6 +63,9 @@ def formatted_source(text: str, file: str) -> str:
     from visup.tasks.tools.formatter import formatted
 
     source = Source(text, file)
-    code, odd = normalise(text, source)
-    raise_all([*(f for f in odd if f.code != "E106"), *parse(code, source).faults], TaskError)
+    code, normalisation_errors = normalise(text, source)
+    raise_all(
+        [*(d for d in normalisation_errors if d.code != "E106"), *parse(code, source).faults],
+        TaskError,
+    )
     return formatted(text)

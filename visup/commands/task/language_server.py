@@ -11,15 +11,17 @@ from lsprotocol import types as lsp
 from pygls.exceptions import JsonRpcException
 from pygls.lsp.server import LanguageServer
 from pygls.uris import from_fs_path, to_fs_path
-from pygls.workspace import ServerTextPosition, ServerTextRange, TextDocument
+from pygls.workspace import TextDocument
 
 from visup.agent.model.errors import SourceError, SourceLocation, VisupError
 from visup.commands.task.editor_features import (
     FEATURES,
-    alike,
-    faults_of,
-    holds_rules,
-    rename_refused,
+    diagnostics_of,
+    file_of,
+    is_rule_file,
+    rename_refusal,
+    same_references,
+    span_range,
 )
 from visup.commands.task.format import formatted_source
 from visup.rules.formula.units import Span
@@ -33,7 +35,7 @@ from visup.tasks.tools.editing import NameUse, completions, definition, hover, n
 from visup.tasks.tools.rule_editing import rule_completions
 from visup.version import __version__
 
-KINDS = {
+COMPLETION_KINDS = {
     "stage": lsp.CompletionItemKind.Class,
     "action": lsp.CompletionItemKind.Function,
     "actor": lsp.CompletionItemKind.Variable,
@@ -43,28 +45,28 @@ KINDS = {
 }
 
 
-LARGEST_MESSAGE_BYTES = 2**26
+MAX_MESSAGE_BYTES = 2**26
 
 
-def serve(sent: BinaryIO, answers: BinaryIO) -> None:
+def serve(editor_input: BinaryIO, editor_output: BinaryIO) -> None:
     """Serve one editor until it exits or disconnects.
 
     Raises:
         SourceError: It announces a message over the size limit.
     """
-    make_server().start_io(cast("BinaryIO", EditorInput(sent)), answers)
+    make_server().start_io(cast("BinaryIO", EditorInput(editor_input)), editor_output)
 
 
 class EditorInput:
     """The input from an editor; limits the memory for a message.
 
     Args:
-        sent: The stream.
+        stream: What the editor sends.
     """
 
-    def __init__(self, sent: BinaryIO) -> None:
-        self.readline = partial(sent.readline, LARGEST_MESSAGE_BYTES)
-        self._read = sent.read
+    def __init__(self, stream: BinaryIO) -> None:
+        self.readline = partial(stream.readline, MAX_MESSAGE_BYTES)
+        self._read = stream.read
 
     def read(self, count: int) -> bytes:
         """Read bytes of a message.
@@ -72,10 +74,10 @@ class EditorInput:
         Raises:
             SourceError: They are over the size limit.
         """
-        if count > LARGEST_MESSAGE_BYTES:
+        if count > MAX_MESSAGE_BYTES:
             raise SourceError(
                 f"the editor sends a message of {count} bytes",
-                expected=f"at most {LARGEST_MESSAGE_BYTES >> 20} MB",
+                expected=f"at most {MAX_MESSAGE_BYTES >> 20} MB",
             )
         return self._read(count)
 
@@ -88,60 +90,65 @@ def make_server() -> LanguageServer:
     return server
 
 
-def _opened(ls: LanguageServer, params: lsp.DidOpenTextDocumentParams) -> None:
+def _did_open(ls: LanguageServer, params: lsp.DidOpenTextDocumentParams) -> None:
     _publish(ls, params.text_document.uri)
 
 
-def _changed(ls: LanguageServer, params: lsp.DidChangeTextDocumentParams) -> None:
+def _did_change(ls: LanguageServer, params: lsp.DidChangeTextDocumentParams) -> None:
     _publish(ls, params.text_document.uri)
 
 
-def _closed(ls: LanguageServer, params: lsp.DidCloseTextDocumentParams) -> None:
+def _did_close(ls: LanguageServer, params: lsp.DidCloseTextDocumentParams) -> None:
     none = lsp.PublishDiagnosticsParams(params.text_document.uri, [])
     ls.text_document_publish_diagnostics(none)
 
 
 def _complete(ls: LanguageServer, params: lsp.CompletionParams) -> list[lsp.CompletionItem]:
     document = ls.workspace.get_text_document(params.text_document.uri)
-    if holds_rules(document):
-        found = list(rule_completions())
+    if is_rule_file(document):
+        proposals = list(rule_completions())
     else:
-        line, column = _from(document, params.position)
-        found = completions(document.source, _file(document), line, column)
-    return [lsp.CompletionItem(p.text, kind=KINDS[p.kind], detail=p.about) for p in found]
+        line, column = _line_and_column(document, params.position)
+        proposals = completions(document.source, file_of(document), line, column)
+    return [
+        lsp.CompletionItem(
+            proposal.text, kind=COMPLETION_KINDS[proposal.kind], detail=proposal.about
+        )
+        for proposal in proposals
+    ]
 
 
 def _rule_meaning(document: TextDocument, word: NameUse) -> str | None:
-    if entry := KEYWORDS.get(word.name) or FUNCTIONS.get(word.name):
-        return f"`{entry[0]}`: {entry[1]}"
-    known = PREDICATES.get(word.name) or QUANTITIES.get(word.name)
-    return f"`{word.name}({', '.join(known.argument_kinds)})`: {known.meaning}" if known else None
+    if keyword := KEYWORDS.get(word.name) or FUNCTIONS.get(word.name):
+        return f"`{keyword[0]}`: {keyword[1]}"
+    entry = PREDICATES.get(word.name) or QUANTITIES.get(word.name)
+    return f"`{word.name}({', '.join(entry.argument_kinds)})`: {entry.meaning}" if entry else None
 
 
-def _show_meaning(ls: LanguageServer, params: lsp.HoverParams) -> lsp.Hover | None:
+def _hover(ls: LanguageServer, params: lsp.HoverParams) -> lsp.Hover | None:
     document, word = _word(ls, params)
     text = None
-    if word is not None and holds_rules(document):
+    if word is not None and is_rule_file(document):
         text = _rule_meaning(document, word)
     elif word is not None:
-        text = hover(document.source, _file(document), word)
+        text = hover(document.source, file_of(document), word)
     if word is None or text is None:
         return None
     content = lsp.MarkupContent(lsp.MarkupKind.Markdown, text)
-    return lsp.Hover(content, _range(document, word.span))
+    return lsp.Hover(content, span_range(document, word.span))
 
 
-def _define(ls: LanguageServer, params: lsp.DefinitionParams) -> lsp.Location | None:
+def _goto_definition(ls: LanguageServer, params: lsp.DefinitionParams) -> lsp.Location | None:
     document, word = _word(ls, params)
     return _location(ls, document, word) if word else None
 
 
 def _format(ls: LanguageServer, params: lsp.DocumentFormattingParams) -> list[lsp.TextEdit]:
     document = ls.workspace.get_text_document(params.text_document.uri)
-    if holds_rules(document):
+    if is_rule_file(document):
         return []  # rules have no standard layout
     try:
-        new = formatted_source(document.source, _file(document))
+        new = formatted_source(document.source, file_of(document))
     except VisupError:
         return []  # the errors are already shown
     if new == document.source:
@@ -154,33 +161,33 @@ def _rename(ls: LanguageServer, params: lsp.RenameParams) -> lsp.WorkspaceEdit:
     document, word = _word(ls, params)
     new = params.new_name.strip("<> ")
     if word is None:
-        raise _refused("here is no name that could be changed")
-    refused = rename_refused(document, word, new)
-    if refused is not None:
-        raise _refused(refused)
-    places = alike(document, word)
-    if not places:
-        raise _refused(f"`{word.name}` belongs to the language, so it cannot be renamed")
-    edits = [lsp.TextEdit(_range(document, w.span), new) for w in places]
+        raise _request_failed("here is no name that could be changed")
+    refusal = rename_refusal(document, word, new)
+    if refusal is not None:
+        raise _request_failed(refusal)
+    uses = same_references(document, word)
+    if not uses:
+        raise _request_failed(f"`{word.name}` belongs to the language, so it cannot be renamed")
+    edits = [lsp.TextEdit(span_range(document, w.span), new) for w in uses]
     return lsp.WorkspaceEdit({document.uri: edits})
 
 
-def _refused(why: str) -> JsonRpcException:
+def _request_failed(reason: str) -> JsonRpcException:
     """The answer of a request that is refused; editors show its reason."""
-    return JsonRpcException(why, lsp.LSPErrorCodes.RequestFailed.value)
+    return JsonRpcException(reason, lsp.LSPErrorCodes.RequestFailed.value)
 
 
 _FEATURES: tuple[tuple[str, Callable[..., Any], Any], ...] = (
-    (lsp.TEXT_DOCUMENT_DID_OPEN, _opened, None),
-    (lsp.TEXT_DOCUMENT_DID_CHANGE, _changed, None),
-    (lsp.TEXT_DOCUMENT_DID_CLOSE, _closed, None),
+    (lsp.TEXT_DOCUMENT_DID_OPEN, _did_open, None),
+    (lsp.TEXT_DOCUMENT_DID_CHANGE, _did_change, None),
+    (lsp.TEXT_DOCUMENT_DID_CLOSE, _did_close, None),
     (
         lsp.TEXT_DOCUMENT_COMPLETION,
         _complete,
         lsp.CompletionOptions(trigger_characters=["<", "(", '"']),
     ),
-    (lsp.TEXT_DOCUMENT_HOVER, _show_meaning, None),
-    (lsp.TEXT_DOCUMENT_DEFINITION, _define, None),
+    (lsp.TEXT_DOCUMENT_HOVER, _hover, None),
+    (lsp.TEXT_DOCUMENT_DEFINITION, _goto_definition, None),
     (lsp.TEXT_DOCUMENT_FORMATTING, _format, None),
     (lsp.TEXT_DOCUMENT_RENAME, _rename, None),
 )
@@ -189,13 +196,13 @@ _FEATURES: tuple[tuple[str, Callable[..., Any], Any], ...] = (
 
 def _publish(server: LanguageServer, uri: str) -> None:
     document = server.workspace.get_text_document(uri)
-    if holds_rules(document):
-        faults = faults_of(document)
+    if is_rule_file(document):
+        diagnostics = diagnostics_of(document)
     else:
-        files = _EditorFiles(server, Path(_file(document)).parent)
-        _, faults = diagnose(document.source, _file(document), read=files.read)
-    shown = [_diagnostic(document, f) for f in faults]
-    server.text_document_publish_diagnostics(lsp.PublishDiagnosticsParams(uri, shown))
+        files = _EditorFiles(server, Path(file_of(document)).parent)
+        _, diagnostics = diagnose(document.source, file_of(document), read=files.read)
+    published = [_diagnostic(document, d) for d in diagnostics]
+    server.text_document_publish_diagnostics(lsp.PublishDiagnosticsParams(uri, published))
 
 
 class _EditorFiles:
@@ -212,21 +219,21 @@ class _EditorFiles:
         return read_beside(path, including, self._root)
 
 
-def _diagnostic(document: TextDocument, fault: Diagnostic) -> lsp.Diagnostic:
-    text = [fault.message]
-    text += [f"expected: {fault.expected}"] if fault.expected else []
-    text += [f"hint: {fault.hint}"] if fault.hint else []
-    place = fault.place
-    if place.file != _file(document):
-        text.insert(0, f"in {place}")
-        place = SourceLocation(_file(document), 1, 1)
+def _diagnostic(document: TextDocument, diagnostic: Diagnostic) -> lsp.Diagnostic:
+    lines = [diagnostic.message]
+    lines += [f"expected: {diagnostic.expected}"] if diagnostic.expected else []
+    lines += [f"hint: {diagnostic.hint}"] if diagnostic.hint else []
+    place = diagnostic.place
+    if place.file != file_of(document):
+        lines.insert(0, f"in {place}")
+        place = SourceLocation(file_of(document), 1, 1)
     span = Span(place.line, place.column, place.line, place.column + place.length)
     return lsp.Diagnostic(
-        _range(document, span),
-        "\n".join(text),
+        span_range(document, span),
+        "\n".join(lines),
         severity=lsp.DiagnosticSeverity.Error,
-        code=fault.code or None,
-        source=f"visup: {explain(fault.code).title}" if fault.code else "visup",
+        code=diagnostic.code or None,
+        source=f"visup: {explain(diagnostic.code).title}" if diagnostic.code else "visup",
     )
 
 
@@ -234,41 +241,31 @@ def _word(
     server: LanguageServer, params: lsp.HoverParams | lsp.DefinitionParams | lsp.RenameParams
 ) -> tuple[TextDocument, NameUse | None]:
     document = server.workspace.get_text_document(params.text_document.uri)
-    return document, name_at(document.source, *_from(document, params.position))
+    return document, name_at(document.source, *_line_and_column(document, params.position))
 
 
 def _location(server: LanguageServer, document: TextDocument, word: NameUse) -> lsp.Location | None:
     if word.kind == "include":
         try:
-            path, _ = _EditorFiles(server, Path(_file(document)).parent).read(
-                word.name, _file(document)
+            path, _ = _EditorFiles(server, Path(file_of(document)).parent).read(
+                word.name, file_of(document)
             )
         except VisupError:
             return None
         uri = from_fs_path(str(Path(path).resolve())) if Path(path).exists() else None
         start = lsp.Position(0, 0)
         return lsp.Location(uri, lsp.Range(start, start)) if uri else None
-    span = definition(document.source, _file(document), word)
+    span = definition(document.source, file_of(document), word)
     if span is None:
         return None
     if not span.file:
-        return lsp.Location(document.uri, _range(document, span))
+        return lsp.Location(document.uri, span_range(document, span))
     uri = from_fs_path(str(Path(span.file).resolve()))
     other = server.workspace.get_text_document(uri) if uri and Path(span.file).exists() else None
-    return lsp.Location(other.uri, _range(other, span)) if other else None
+    return lsp.Location(other.uri, span_range(other, span)) if other else None
 
 
-def _file(document: TextDocument) -> str:
-    return to_fs_path(document.uri) or document.uri
-
-
-def _from(document: TextDocument, position: lsp.Position) -> tuple[int, int]:
+def _line_and_column(document: TextDocument, position: lsp.Position) -> tuple[int, int]:
     """Line and column counted from 1, in characters."""
-    here = document.position_from_client_units(position)
-    return here.line + 1, here.character + 1
-
-
-def _range(document: TextDocument, span: Span) -> lsp.Range:
-    start = ServerTextPosition(span.line - 1, span.column - 1)
-    end = ServerTextPosition(max(span.line, span.end_line) - 1, span.end_column - 1)
-    return document.range_to_client_units(ServerTextRange(start, end))
+    cursor = document.position_from_client_units(position)
+    return cursor.line + 1, cursor.character + 1

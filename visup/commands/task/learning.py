@@ -42,24 +42,26 @@ def learn(
     from visup.runs.learning_runs import declared_actors, run_trace
     from visup.tasks.learning.induction import learn_task
 
-    _writable(out)
-    declared = {n: a for run in runs for n, a in declared_actors(run).items()}
-    word = name or "".join(c if c.isalnum() else "_" for c in out.stem)
+    _check_writable(out)
+    actors = {n: actor for run in runs for n, actor in declared_actors(run).items()}
+    task_name = name or "".join(c if c.isalnum() else "_" for c in out.stem)
     good = [run_trace(run) for run in runs]
-    learned = learn_task(word, good, [run_trace(run) for run in bad or ()], declared)
+    learned = learn_task(task_name, good, [run_trace(run) for run in bad or ()], actors)
     out.write_text(learned.text, encoding="utf-8")
-    wrong = [n for n, v in learned.good.items() if v is not Verdict.SUCCEEDED]
-    wrong += [n for n, v in learned.bad.items() if v is Verdict.SUCCEEDED]
+    misjudged = [run for run, verdict in learned.good.items() if verdict is not Verdict.SUCCEEDED]
+    misjudged += [run for run, verdict in learned.bad.items() if verdict is Verdict.SUCCEEDED]
     if as_json:
-        verdicts = {n: v.value for n, v in (*learned.good.items(), *learned.bad.items())}
+        verdicts = {
+            run: verdict.value for run, verdict in (*learned.good.items(), *learned.bad.items())
+        }
         echo_json({"file": str(out), "verdicts": verdicts, "left_out": learned.dropped}, indent=2)
     else:
         echo(learned.text, nl=False)
-        for what in learned.dropped:
-            echo(f"left out: {what}")
+        for dropped in learned.dropped:
+            echo(f"left out: {dropped}")
         for run, verdict in (*learned.good.items(), *learned.bad.items()):
             echo(f"{run}: {verdict.value.replace('_', ' ')}")
-    raise typer.Exit(1 if wrong else 0)
+    raise typer.Exit(1 if misjudged else 0)
 
 
 def fit(
@@ -75,13 +77,13 @@ def fit(
     from visup.tasks.learning.fitting import fitted_amounts, with_amounts
 
     task = load_task(str(file))
-    fitted = fitted_amounts(task, _judged(task, runs))
+    fitted = fitted_amounts(task, _judge_runs(task, runs))
     for change in fitted:
         echo(f"<{change.stage}>: {change.clause} -> {change.new} ({change.seen})")
     if not fitted:
         echo("Nothing changes.")
     elif not dry_run:
-        _writable(file)
+        _check_writable(file)
         file.write_text(with_amounts(read_text(str(file)), fitted), encoding="utf-8")
 
 
@@ -94,7 +96,7 @@ def coverage(file: OneTask, runs: Runs, as_json: AsJson = False) -> None:
     from visup.tasks.checks.load import load_task
 
     task = load_task(file)
-    stages = coverage_of(task, _judged(task, runs))
+    stages = coverage_of(task, _judge_runs(task, runs))
     share = share_covered(stages)
     if as_json:
         rows: dict[str, Any] = {
@@ -125,23 +127,23 @@ def diff(
     from visup.tasks.analysis.languages import difference
     from visup.tasks.checks.load import load_task
 
-    found = difference(load_task(first), load_task(second))
-    lines = list(found.lines(f"`{first}`", f"`{second}`"))
+    differences = difference(load_task(first), load_task(second))
+    lines = list(differences.lines(f"`{first}`", f"`{second}`"))
     if as_json:
-        echo_json({"same": not found, "differences": lines if found else []}, indent=2)
+        echo_json({"same": not differences, "differences": lines if differences else []}, indent=2)
     else:
         for line in lines:
             echo(line)
-    raise typer.Exit(1 if found else 0)
+    raise typer.Exit(1 if differences else 0)
 
 
-def _judged(task: Task, runs: Sequence[Path]) -> list[JudgedRun]:
+def _judge_runs(task: Task, runs: Sequence[Path]) -> list[JudgedRun]:
     from visup.runs.learning_runs import run_judged
 
     return [run_judged(task, run) for run in runs]
 
 
-def _writable(path: Path) -> None:
+def _check_writable(path: Path) -> None:
     """Fail before the work rather than after it.
 
     Raises:

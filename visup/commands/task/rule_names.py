@@ -9,9 +9,9 @@ from visup.rules.language.keywords import FUNCTIONS, KEYWORDS
 from visup.rules.predicates.vocabulary import PREDICATES, QUANTITIES
 from visup.tasks.tools.editing import NameUse
 
-_START = re.compile(r"^[ \t]*rule\b", re.MULTILINE)
+_RULE_START = re.compile(r"^[ \t]*rule\b", re.MULTILINE)
 _IGNORED = re.compile(r"#[^\n]*|(?<=\")[^\"\n]*(?=\")")
-_IN_SENTENCE = re.compile(r"\{\w+\}")
+_PLACEHOLDER = re.compile(r"\{\w+\}")
 _NAME = re.compile(r"(?<![\w.])[A-Za-z_]\w*(?!\w|\s*\()")
 _HEAD = re.compile(r"\s*rule\s+\w+\s*\(([^()]*)\)")
 _BOUND = re.compile(r"\b(?:let|exists|forall)\s+(\w+)")
@@ -35,12 +35,12 @@ def rule_references(text: str, word: NameUse) -> list[NameUse]:
     ]
 
 
-def rule_rename_refused(text: str, word: NameUse, new: str) -> str | None:
+def rule_rename_refusal(text: str, word: NameUse, new: str) -> str | None:
     """Why a name of a rule cannot be renamed, or None if it can."""
     if re.fullmatch(r"[A-Za-z_]\w*", new) is None or new == "is":
         return f"`{new}` is no name: letters, digits and `_`, beginning with a letter"
-    known = {**KEYWORDS, **FUNCTIONS, **PREDICATES, **QUANTITIES}
-    if new in known:
+    reserved = {**KEYWORDS, **FUNCTIONS, **PREDICATES, **QUANTITIES}
+    if new in reserved:
         return f"`{new}` is a word of the language"
     _, rule = _rule_around(text, word.span)
     if any(m[0] == new for m in _NAME.finditer(rule)):
@@ -50,10 +50,10 @@ def rule_rename_refused(text: str, word: NameUse, new: str) -> str | None:
 
 def _rule_around(text: str, span: Span) -> tuple[int, str]:
     """Offset and text of the rule around a span, with everything but names blanked."""
-    at = sum(len(line) + 1 for line in text.split("\n")[: span.line - 1]) + span.column - 1
-    starts = [m.start() for m in _START.finditer(text)]
-    begin = max((s for s in starts if s <= at), default=0)
-    end = min((s for s in starts if s > at), default=len(text))
+    offset = sum(len(line) + 1 for line in text.split("\n")[: span.line - 1]) + span.column - 1
+    starts = [m.start() for m in _RULE_START.finditer(text)]
+    begin = max((s for s in starts if s <= offset), default=0)
+    end = min((s for s in starts if s > offset), default=len(text))
     return begin, _IGNORED.sub(lambda m: _blank(m[0]), text[begin:end])
 
 
@@ -61,10 +61,10 @@ def _blank(ignored: str) -> str:
     """Blanks for a comment, or for a message except the names in it."""
     if ignored.startswith("#"):
         return " " * len(ignored)
-    kept = [" "] * len(ignored)
-    for m in _IN_SENTENCE.finditer(ignored):
-        kept[m.start() : m.end()] = m[0]
-    return "".join(kept)
+    blanked = [" "] * len(ignored)
+    for m in _PLACEHOLDER.finditer(ignored):
+        blanked[m.start() : m.end()] = m[0]
+    return "".join(blanked)
 
 
 def _bound(rule: str) -> set[str]:

@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 
 def simulate(
     file: Annotated[str, typer.Argument(help="A task file, `file.task:NAME`, or a shipped task.")],
-    listed: Annotated[
+    list_count: Annotated[
         int | None, typer.Option("--list", min=1, help="List this many sequences, shortest first.")
     ] = None,
-    drawn: Annotated[
+    sample_count: Annotated[
         int | None, typer.Option("--sample", min=1, help="Sample this many sequences at random.")
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the sampling.")] = 0,
@@ -27,11 +27,11 @@ def simulate(
     from visup.tasks.checks.load import load_task
 
     task = load_task(file)
-    if listed is not None:
-        _list(task, listed)
-    if drawn is not None:
-        _sample(task, drawn, seed)
-    if listed is None and drawn is None:
+    if list_count is not None:
+        _list(task, list_count)
+    if sample_count is not None:
+        _sample(task, sample_count, seed)
+    if list_count is None and sample_count is None:
         _walk(task)
 
 
@@ -40,10 +40,10 @@ def _list(task: Task, count: int) -> None:
 
     from visup.tasks.tools.simulate import traces
 
-    found = traces(task)
-    for number, course in enumerate(islice(found, count), 1):
-        echo(f"{number}. {_line(course)}")
-    if next(found, None) is not None:
+    sequences = traces(task)
+    for number, trace in enumerate(islice(sequences, count), 1):
+        echo(f"{number}. {_trace_text(trace)}")
+    if next(sequences, None) is not None:
         echo("and more")
 
 
@@ -54,8 +54,8 @@ def _sample(task: Task, count: int, seed: int) -> None:
 
     rng = Random(seed)
     for number in range(1, count + 1):
-        course, ended = sample(task, rng)
-        echo(f"{number}. {_line(course)}{'' if ended else ', and so on'}")
+        trace, ended = sample(task, rng)
+        echo(f"{number}. {_trace_text(trace)}{'' if ended else ', and so on'}")
 
 
 def _walk(task: Task) -> None:
@@ -63,21 +63,21 @@ def _walk(task: Task) -> None:
     from visup.tasks.tools.simulate import initial_positions, successors
 
     echo(f"task {task.name}: choose the next step by number; q quits")
-    places = initial_positions(task)
+    positions = initial_positions(task)
     while True:
-        for number, place in enumerate(places, 1):
-            echo(f"  {number}) {_option(place)}")
-        chosen = _ask(places)
+        for number, position in enumerate(positions, 1):
+            echo(f"  {number}) {_option_text(position)}")
+        chosen = _choose(positions)
         if chosen is None:
             return
         if chosen.state is None:
             echo("the task is done")
             return
-        echo(f"now: {_sentence(chosen.moment)}")
-        places = successors(task, chosen)
+        echo(f"now: {_moment_text(chosen.moment)}")
+        positions = successors(task, chosen)
 
 
-def _ask(places: tuple[Position, ...]) -> Position | None:
+def _choose(positions: tuple[Position, ...]) -> Position | None:
     while True:
         try:
             answer = input("> ").strip().lower()
@@ -86,20 +86,20 @@ def _ask(places: tuple[Position, ...]) -> Position | None:
             return None
         if answer in ("q", "quit", "exit"):
             return None
-        if answer.isdecimal() and 1 <= int(answer[:9]) <= len(places):
-            return places[int(answer[:9]) - 1]
-        if not answer and len(places) == 1:
-            return places[0]
-        echo(f"  a number from 1 to {len(places)}, or q")
+        if answer.isdecimal() and 1 <= int(answer[:9]) <= len(positions):
+            return positions[int(answer[:9]) - 1]
+        if not answer and len(positions) == 1:
+            return positions[0]
+        echo(f"  a number from 1 to {len(positions)}, or q")
 
 
-def _option(place: Position) -> str:
-    return _sentence(place.moment) if place.state is not None else "(the task is done)"
+def _option_text(position: Position) -> str:
+    return _moment_text(position.moment) if position.state is not None else "(the task is done)"
 
 
-def _line(course: Trace) -> str:
-    return ", then ".join(map(_sentence, course)) or "(nothing)"
+def _trace_text(trace: Trace) -> str:
+    return ", then ".join(map(_moment_text, trace)) or "(nothing)"
 
 
-def _sentence(moment: Moment) -> str:
+def _moment_text(moment: Moment) -> str:
     return " & ".join(moment)

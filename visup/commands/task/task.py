@@ -41,22 +41,26 @@ def check(files: Files, as_json: AsJson = False, without: Without = None) -> Non
     from visup.tasks.checks.diagnose import diagnose
     from visup.tasks.checks.files import read_text
 
-    odd = set(without or ()) - ALL_PERCEPTS
-    if odd:
-        what = f"there is no kind of percept called `{min(odd)}`"
-        raise SettingsError(what, expected=f"one of: {', '.join(sorted(ALL_PERCEPTS))}")
-    found: dict[str, list[VisupError]] = {}
+    unknown = set(without or ()) - ALL_PERCEPTS
+    if unknown:
+        message = f"there is no kind of percept called `{min(unknown)}`"
+        raise SettingsError(message, expected=f"one of: {', '.join(sorted(ALL_PERCEPTS))}")
+    errors_by_file: dict[str, list[VisupError]] = {}
     for file in files:
         try:
-            faults = diagnose(read_text(file), file, percepts=ALL_PERCEPTS - set(without or ()))[1]
-            found[file] = [f.error(TaskError) for f in faults]
-        except VisupError as e:
-            found[file] = [e]
-    reported = [e for errors in found.values() for e in errors]
+            diagnostics = diagnose(
+                read_text(file), file, percepts=ALL_PERCEPTS - set(without or ())
+            )[1]
+            errors_by_file[file] = [d.error(TaskError) for d in diagnostics]
+        except VisupError as error:
+            errors_by_file[file] = [error]
+    reported = [e for errors in errors_by_file.values() for e in errors]
     if as_json:
-        echo_json({f: [_as_data(e) for e in es] for f, es in found.items()}, indent=2)
+        echo_json(
+            {f: [_as_data(e) for e in errors] for f, errors in errors_by_file.items()}, indent=2
+        )
         raise typer.Exit(2 if reported else 0)
-    for file, errors in found.items():
+    for file, errors in errors_by_file.items():
         if not errors:
             echo(f"{file}: ok")
     raise_errors(reported)
@@ -94,8 +98,8 @@ def list_tasks(as_json: AsJson = False) -> None:
         echo_json(about, indent=2)
         return
     width = max(map(len, about), default=0)
-    for name, words in about.items():
-        echo(f"{name:{width}}  {words}")
+    for name, comment in about.items():
+        echo(f"{name:{width}}  {comment}")
 
 
 @app.command()
@@ -104,14 +108,14 @@ def actions(as_json: AsJson = False) -> None:
     from visup.tasks.actions.actions import known_actions
     from visup.tasks.actions.describe import written
 
-    said = {m.name: (written(m), m.about or m.text) for m in known_actions().values()}
+    entries = {m.name: (written(m), m.about or m.text) for m in known_actions().values()}
     if as_json:
-        data = {n: {"written": w, "about": a} for n, (w, a) in said.items()}
+        data = {n: {"written": form, "about": about} for n, (form, about) in entries.items()}
         echo_json(data, indent=2)
         return
-    width = max(len(w) for w, _ in said.values())
-    for how, about in sorted(said.values()):
-        echo(f"{how:{width}}  {about}")
+    width = max(len(form) for form, _ in entries.values())
+    for form, about in sorted(entries.values()):
+        echo(f"{form:{width}}  {about}")
 
 
 @app.command()
@@ -152,10 +156,10 @@ def lsp() -> None:
 
     try:
         from visup.commands.task.language_server import serve
-    except ModuleNotFoundError as e:
-        if (e.name or "").split(".")[0] not in ("pygls", "lsprotocol"):
+    except ModuleNotFoundError as error:
+        if (error.name or "").split(".")[0] not in ("pygls", "lsprotocol"):
             raise
-        raise ExtraMissingError("`visup task lsp`", "lsp") from e
+        raise ExtraMissingError("`visup task lsp`", "lsp") from error
     serve(sys.stdin.buffer, sys.stdout.buffer)
 
 
@@ -163,9 +167,9 @@ def _as_data(error: VisupError) -> dict[str, Any]:
     from visup.agent.model.errors import SourceLocation
 
     where = error.where
-    place: dict[str, Any] = {"file": str(where) if where else None}
+    location: dict[str, Any] = {"file": str(where) if where else None}
     if isinstance(where, SourceLocation):
-        place = {
+        location = {
             "file": where.file,
             "line": where.line,
             "column": where.column,
@@ -174,7 +178,7 @@ def _as_data(error: VisupError) -> dict[str, Any]:
     return {
         "code": error.code,
         "what": error.what,
-        **place,
+        **location,
         "expected": error.expected,
         "hint": error.hint,
     }

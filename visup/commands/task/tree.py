@@ -31,11 +31,11 @@ def task_tree(task: Task) -> Tree:
     Returns:
         A rich tree; each stage is expanded at its first reference.
     """
-    whole = outline(task)
-    tree = Tree(_text(whole))
-    _grow(tree, whole)
+    root = outline(task)
+    tree = Tree(_text(root))
+    _add_children(tree, root)
     declared = (
-        ("actors", _shown_actors(task.actors)),
+        ("actors", _merged_actors(task.actors)),
         ("zones", task.zones),
         ("parameters", task.parameters),
         ("invariants", task.invariants),
@@ -48,15 +48,15 @@ def task_tree(task: Task) -> Tree:
     return tree
 
 
-def _shown_actors(actors: Sequence[Actor]) -> tuple[Actor, ...]:
+def _merged_actors(actors: Sequence[Actor]) -> tuple[Actor, ...]:
     """The actors, with a single one in place of those that a loop takes one per iteration."""
     kinds = (replace(a, name=a.spare) if a.spare else a for a in actors)
     return tuple({a.name: a for a in reversed(tuple(kinds))}.values())[::-1]
 
 
-def _grow(tree: Tree, branch: Branch) -> None:
-    for inner in branch.inside:
-        _grow(tree.add(_text(inner)), inner)
+def _add_children(tree: Tree, branch: Branch) -> None:
+    for child in branch.inside:
+        _add_children(tree.add(_text(child)), child)
 
 
 def _text(branch: Branch) -> str:
