@@ -1,4 +1,4 @@
-"""The public API: what stands at the root, what a run tells, and how runs become tables."""
+"""The public API: names at the root, results of runs, and tables."""
 
 from __future__ import annotations
 
@@ -46,13 +46,13 @@ def declared() -> set[str]:
     return {alias.asname or alias.name for node in imports for alias in node.names}
 
 
-def test_every_public_name_is_declared_listed_and_found() -> None:
+def test_every_public_name_is_declared_and_listed() -> None:
     assert declared() == set(visup.__all__)
     assert all(getattr(visup, name) is not None for name in visup.__all__)
     assert set(visup.__all__) <= set(dir(visup))
 
 
-def test_what_is_not_public_is_told_as_any_module_tells_it() -> None:
+def test_an_unknown_name_gives_the_usual_attribute_error() -> None:
     with pytest.raises(AttributeError, match="module 'visup' has no attribute 'wach'"):
         visup.wach  # noqa: B018
 
@@ -65,7 +65,7 @@ def test_importing_visup_loads_nothing_heavy() -> None:
     assert done.stdout.strip() == "[]"
 
 
-def test_a_run_goes_on_as_it_is_iterated_over_and_steps_carry_their_frames(clip: Path) -> None:
+def test_a_run_advances_by_iteration_and_steps_carry_frames(clip: Path) -> None:
     with visup.watch(clip, fps=25) as run:
         first, second = next(run), next(run)
         assert first.frame is not None
@@ -77,7 +77,7 @@ def test_a_run_goes_on_as_it_is_iterated_over_and_steps_carry_their_frames(clip:
     assert list(run) == []
 
 
-def test_asking_before_the_first_step_watches_the_whole_source(clip: Path) -> None:
+def test_asking_for_results_first_watches_the_whole_source(clip: Path) -> None:
     run = visup.watch(clip, fps=25)
     assert run.verdict is None
     assert len(run.steps) == FRAMES
@@ -85,14 +85,14 @@ def test_asking_before_the_first_step_watches_the_whole_source(clip: Path) -> No
     assert run.result.steps == FRAMES
 
 
-def test_the_kept_steps_say_how_to_be_drawn(recorded: tuple[visup.Run, Path]) -> None:
+def test_only_the_last_stored_step_carries_its_frame(recorded: tuple[visup.Run, Path]) -> None:
     run, _ = recorded
     assert run.steps[-1].draw().shape == (120, 160, 3)
     with pytest.raises(SettingsError, match="does not carry its image"):
         run.steps[0].draw()
 
 
-def test_a_picture_is_the_frame_with_what_is_believed_drawn_over_it(clip: Path) -> None:
+def test_a_picture_is_the_frame_with_beliefs_drawn_over_it(clip: Path) -> None:
     step = [s for s in visup.watch(clip, fps=25) if s.mind.objects][-1]
     assert step.frame is not None
     picture = step.draw()
@@ -104,7 +104,7 @@ def test_a_picture_is_the_frame_with_what_is_believed_drawn_over_it(clip: Path) 
         step.draw(other)
 
 
-def test_a_recorded_run_gives_back_the_records_of_the_run(
+def test_a_recorded_run_has_the_records_of_the_run(
     recorded: tuple[visup.Run, Path],
 ) -> None:
     run, folder = recorded
@@ -120,7 +120,7 @@ def test_a_recorded_run_gives_back_the_records_of_the_run(
     assert len(again.events) > 0
 
 
-def test_tables_have_the_same_columns_however_many_records_there_are(
+def test_columns_do_not_depend_on_the_number_of_records(
     recorded: tuple[visup.Run, Path],
 ) -> None:
     pytest.importorskip("pyarrow", reason="the extra visup[tables] is not installed")
@@ -141,7 +141,7 @@ def test_a_table_without_its_library_names_the_extra(monkeypatch: pytest.MonkeyP
         Records(RecordedStep, [RecordedStep(0, 0.0)]).to_pandas()
 
 
-def test_runs_and_records_show_themselves(recorded: tuple[visup.Run, Path]) -> None:
+def test_runs_and_records_have_displays(recorded: tuple[visup.Run, Path]) -> None:
     run, folder = recorded
     again = visup.open_run(folder)
     assert '<img alt="' in run._repr_html_()
@@ -155,7 +155,7 @@ def test_runs_and_records_show_themselves(recorded: tuple[visup.Run, Path]) -> N
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("arguments", "message"),
     [
         ({"source": "nowhere.mp4"}, "there is no such file"),
         ({"source": None}, "a source cannot be None"),
@@ -169,10 +169,10 @@ def test_runs_and_records_show_themselves(recorded: tuple[visup.Run, Path]) -> N
         ({"source": visup.Settings("x"), "every": 2}, "a Settings object is complete"),
     ],
 )
-def test_bad_input_is_told_in_words(given: dict[str, object], said: str) -> None:
-    with pytest.raises((SettingsError, SourceError)) as told:
-        visup.watch(**given)  # type: ignore[arg-type]
-    assert said in str(told.value)
+def test_bad_input_is_explained(arguments: dict[str, object], message: str) -> None:
+    with pytest.raises((SettingsError, SourceError)) as caught:
+        visup.watch(**arguments)  # type: ignore[arg-type]
+    assert message in str(caught.value)
 
 
 def test_a_task_that_was_loaded_can_be_verified(clip: Path) -> None:

@@ -17,8 +17,8 @@ from visup.runs.wiring import build_agent
 from visup.testing import check_behaviour
 
 
-def visup(*words: object) -> tuple[int, str]:
-    result = CliRunner().invoke(app, [str(w) for w in words])
+def visup(*arguments: object) -> tuple[int, str]:
+    result = CliRunner().invoke(app, [str(w) for w in arguments])
     if isinstance(result.exception, VisupError):
         return 2, str(result.exception)
     if result.exception is not None and not isinstance(result.exception, SystemExit):
@@ -27,73 +27,74 @@ def visup(*words: object) -> tuple[int, str]:
 
 
 @pytest.mark.parametrize("name", ["lamp", "two_words", "_", "Lamp2"])
-def test_a_new_behaviour_runs_at_once(name: str, tmp_path: Path) -> None:
+def test_a_new_behaviour_keeps_its_contract(name: str, tmp_path: Path) -> None:
     code, _ = visup("behaviours", "new", name, "--out", tmp_path)
     assert code == 0
-    (made,) = load_behaviours(str(tmp_path / f"{name}.py"))
-    assert made.contract.name == name
-    check_behaviour(made)
+    (behaviour,) = load_behaviours(str(tmp_path / f"{name}.py"))
+    assert behaviour.contract.name == name
+    check_behaviour(behaviour)
     assert len((tmp_path / f"{name}.py").read_text().splitlines()) < 40
 
 
-def test_nothing_is_written_over(tmp_path: Path) -> None:
+def test_existing_files_are_not_overwritten(tmp_path: Path) -> None:
     (tmp_path / "lamp.py").write_text("mine")
-    code, told = visup("behaviours", "new", "lamp", "--out", tmp_path)
-    assert (code, "already exists" in told) == (2, True)
+    code, output = visup("behaviours", "new", "lamp", "--out", tmp_path)
+    assert (code, "already exists" in output) == (2, True)
     assert (tmp_path / "lamp.py").read_text() == "mine"
 
 
 @pytest.mark.parametrize("name", ["two words", "class", "1st", ""])
-def test_what_is_no_name_is_refused(name: str, tmp_path: Path) -> None:
-    code, told = visup("behaviours", "new", name, "--out", tmp_path)
-    assert (code, "not a valid name for a behaviour" in told) == (2, True)
+def test_invalid_names_are_refused(name: str, tmp_path: Path) -> None:
+    code, output = visup("behaviours", "new", name, "--out", tmp_path)
+    assert (code, "not a valid name for a behaviour" in output) == (2, True)
 
 
-def test_check_says_what_it_found_and_exits_accordingly(tmp_path: Path) -> None:
+def test_check_prints_its_results_and_sets_the_exit_code(tmp_path: Path) -> None:
     visup("behaviours", "new", "lamp", "--out", tmp_path)
     path = tmp_path / "lamp.py"
-    code, told = visup("behaviours", "check", path)
-    assert (code, told.count("ok ")) == (0, 14)
+    code, output = visup("behaviours", "check", path)
+    assert (code, output.count("ok ")) == (0, 14)
     path.write_text(path.read_text().replace("(x, y)", "float('nan')"))
-    code, told = visup("behaviours", "check", path, "--set", "lamp.contrast=1")
+    code, output = visup("behaviours", "check", path, "--set", "lamp.contrast=1")
     assert code == 1
     assert (
-        "failed runs on a disc that moves: frame 0: behaviour 'lamp' reported 'lamp' as nan" in told
+        "failed runs on a disc that moves: frame 0: behaviour 'lamp' reported 'lamp' as nan"
+        in output
     )
-    assert "expected a finite number, or None" in told
+    assert "expected a finite number, or None" in output
     assert visup("behaviours", "check", tmp_path / "none.py")[0] == 2
-    code, told = visup("behaviours", "check", path, "--set", "lamp.contrast=-1")
-    assert (code, "expected: greater than 0" in told) == (2, True)
+    code, output = visup("behaviours", "check", path, "--set", "lamp.contrast=-1")
+    assert (code, "expected: greater than 0" in output) == (2, True)
 
 
-def test_list_shows_what_is_installed_at_80_columns() -> None:
-    code, told = visup("behaviours", "list")
+def test_list_shows_installed_behaviours_within_80_columns() -> None:
+    code, output = visup("behaviours", "list")
     assert code == 0
-    assert all(name in told for name in ("motion", "shape", "depth", "health"))
-    assert max(map(len, told.splitlines())) <= 80
+    assert all(name in output for name in ("motion", "shape", "depth", "health"))
+    assert max(map(len, output.splitlines())) <= 80
 
 
 def test_an_installed_behaviour_is_checked_by_name() -> None:
-    code, told = visup("behaviours", "check", "health")
-    assert (code, "failed" in told) == (0, False)
+    code, output = visup("behaviours", "check", "health")
+    assert (code, "failed" in output) == (0, False)
 
 
-def test_settings_go_from_the_command_line_into_the_run(tmp_path: Path) -> None:
+def test_settings_and_isolation_reach_the_agent(tmp_path: Path) -> None:
     visup("behaviours", "new", "lamp", "--out", tmp_path)
-    made = WatchSettings(
+    settings = WatchSettings(
         "clip.mp4",
         behaviours=(tmp_path / "lamp.py",),
         plugin_settings={"lamp": {"contrast": 7}},
         isolate=("lamp",),
         budgets=True,
     )
-    agent = build_agent(made)
+    agent = build_agent(settings)
     lamp = next(b for b in agent.behaviours if b.contract.name == "lamp")
     # It runs in a process of its own, and so is never made in this one.
     assert isinstance(lamp, IsolatedBehaviour)
     assert lamp.settings == {"contrast": 7}
-    here = build_agent(replace(made, isolate=()))
-    lamp = next(b for b in here.behaviours if b.contract.name == "lamp")
+    unisolated = build_agent(replace(settings, isolate=()))
+    lamp = next(b for b in unisolated.behaviours if b.contract.name == "lamp")
     assert lamp.settings.contrast == 7  # type: ignore[attr-defined]
     assert (set(agent.limits.isolate), agent.limits.budgets) == ({"lamp"}, True)
 
@@ -107,15 +108,15 @@ def test_settings_go_from_the_command_line_into_the_run(tmp_path: Path) -> None:
         (("--isolate", "lamp"), "called 'lamp' to isolate"),
     ],
 )
-def test_what_cannot_be_set_is_refused_before_the_run(
+def test_invalid_settings_are_refused_before_the_run(
     options: tuple[str, ...], message: str, tmp_path: Path
 ) -> None:
     clip = write_clip(tmp_path / "clip.avi", moving_disc(3))
-    code, told = visup("watch", clip, "--out", tmp_path / "run", *options)
-    assert (code, message in told) == (2, True), told
+    code, output = visup("watch", clip, "--out", tmp_path / "run", *options)
+    assert (code, message in output) == (2, True), output
 
 
-def test_a_run_with_an_isolated_behaviour_that_dies_goes_on_to_its_end(
+def test_a_run_continues_after_an_isolated_behaviour_dies(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -128,8 +129,8 @@ def test_a_run_with_an_isolated_behaviour_that_dies_goes_on_to_its_end(
         "    def perceive(self, frame, observation, directives):\n"
         "        os._exit(7)\n"
     )
-    words = ["--behaviour", "mine.py", "--isolate", "mine", "--out", "run"]
-    done = caller(monkeypatch, capfd)("watch", clip, "--json", "--no-video", *words)
+    arguments = ["--behaviour", "mine.py", "--isolate", "mine", "--out", "run"]
+    done = caller(monkeypatch, capfd)("watch", clip, "--json", "--no-video", *arguments)
     assert done.code == 1, done.err
     assert done.err == ""
     assert "The behaviour 'mine' failed; its output is unavailable." in done.out

@@ -138,7 +138,7 @@ def scenario_that_is_none(folder: Path) -> list[object]:
 
 
 @pytest.mark.parametrize(
-    ("make", "said"),
+    ("make", "message"),
     [
         (text_named_mp4, "story.mp4"),
         (missing_video, "nothing.mp4"),
@@ -161,13 +161,13 @@ def scenario_that_is_none(folder: Path) -> list[object]:
         (scenario_that_is_none, "x.toml"),
     ],
 )
-def test_bad_input_is_one_message_and_exit_code_2(
-    visup: Call, clip: Path, tmp_path: Path, make: Make, said: str
+def test_bad_input_gives_one_message_and_exit_code_2(
+    visup: Call, clip: Path, tmp_path: Path, make: Make, message: str
 ) -> None:
     result = visup(*make(tmp_path))
     assert result.code == 2, result.out + result.err
     everything = result.out + result.err
-    assert said in everything.replace("\n", "") or said in everything
+    assert message in everything.replace("\n", "") or message in everything
     assert "Traceback" not in everything
 
 
@@ -179,14 +179,16 @@ def test_three_mistakes_in_a_task_give_three_messages(visup: Call, tmp_path: Pat
 
 
 @pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="root may write anywhere")
-def test_an_output_folder_without_permission(visup: Call, clip: Path, tmp_path: Path) -> None:
+def test_an_output_folder_without_permission_is_reported(
+    visup: Call, clip: Path, tmp_path: Path
+) -> None:
     (tmp_path / "locked").mkdir(mode=0o500)
     result = visup("watch", clip, "--out", tmp_path / "locked" / "run")
     assert result.code == 2
     assert "cannot be written" in result.err
 
 
-def test_a_run_leaves_all_of_its_files(visup: Call, clip: Path, tmp_path: Path) -> None:
+def test_a_run_writes_all_its_files(visup: Call, clip: Path, tmp_path: Path) -> None:
     result = visup("watch", clip, "--out", tmp_path / "run")
     assert result.code == 0, result.out + result.err
     assert "Verdict" in result.out.splitlines()[-1]
@@ -194,7 +196,7 @@ def test_a_run_leaves_all_of_its_files(visup: Call, clip: Path, tmp_path: Path) 
         assert (tmp_path / "run" / name).stat().st_size > 0, name
 
 
-def test_json_output_is_one_object_a_line_and_the_verdict_last(
+def test_json_output_is_one_object_per_line_with_the_verdict_last(
     visup: Call, clip: Path, tmp_path: Path
 ) -> None:
     result = visup("watch", clip, "--json", "--out", tmp_path / "run", "--no-video")
@@ -204,14 +206,14 @@ def test_json_output_is_one_object_a_line_and_the_verdict_last(
     assert any(e["kind"] == "entry" for e in lines[:-1])
 
 
-def test_quiet_says_the_verdict_and_where_the_report_is(
+def test_quiet_prints_only_the_report_path_and_the_verdict(
     visup: Call, clip: Path, tmp_path: Path
 ) -> None:
     result = visup("watch", clip, "--quiet", "--out", tmp_path / "run", "--no-video")
     assert len(result.out.splitlines()) == 2
 
 
-def test_a_video_that_breaks_off_keeps_what_was_seen_and_says_so(
+def test_a_truncated_video_gives_a_result_with_its_problem(
     visup: Call, clip: Path, tmp_path: Path
 ) -> None:
     whole = clip.read_bytes()
@@ -228,7 +230,7 @@ def test_default_run_folders_are_numbered(visup: Call, clip: Path, tmp_path: Pat
         assert (tmp_path / folder / "journal.sqlite").exists()
 
 
-def test_the_version_is_told(visup: Call) -> None:
+def test_the_version_is_printed(visup: Call) -> None:
     assert visup("--version").out.startswith("visup ")
 
 
@@ -238,26 +240,26 @@ def test_the_doctor_finds_nothing_broken(visup: Call) -> None:
     assert "broken" not in result.out
 
 
-def test_the_doctor_tells_what_this_machine_can_do() -> None:
+def test_the_doctor_measures_the_speed_of_this_machine() -> None:
     head, *rows = speeds(frames=6)
     assert "Frames a second" in head
     assert len(rows) == 2 + len(PRESETS)
-    found = [
+    matches = [
         re.search(r"([\d.]+) of +([\d.]+) that it asks for: (keeps|drops)", row) for row in rows
     ]
-    figures = [(float(m[1]), float(m[2]), m[3]) for m in found if m]
+    figures = [(float(m[1]), float(m[2]), m[3]) for m in matches if m]
     assert len(figures) == len(rows)
-    assert all((looked >= wanted) == (word == "keeps") for looked, wanted, word in figures)
+    assert all((possible >= wanted) == (keeps == "keeps") for possible, wanted, keeps in figures)
     assert [wanted for _, wanted, _ in figures] == [25.0, 25.0, 25.0, 25.0, 12.5, 25.0]
 
 
-def test_the_doctor_knows_what_visup_depends_on() -> None:
+def test_the_doctor_checks_all_dependencies() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    own = project["optional-dependencies"]
+    extras = project["optional-dependencies"]
     bundles = {"all", "dev"}
     assert list(LIBRARIES) == [bare(name) for name in project["dependencies"]]
     assert {extra: names for extra, (_, names) in EXTRAS.items()} == {
-        extra: tuple(map(bare, names)) for extra, names in own.items() if extra not in bundles
+        extra: tuple(map(bare, names)) for extra, names in extras.items() if extra not in bundles
     }
 
 
@@ -266,17 +268,17 @@ def bare(requirement: str) -> str:
     return re.split(r"[\[>=]", requirement)[0]
 
 
-@pytest.mark.parametrize("said", ["", "Unable to allocate 9 GiB"])
-def test_memory_that_runs_out_is_told(
-    visup: Call, monkeypatch: pytest.MonkeyPatch, said: str
+@pytest.mark.parametrize("message", ["", "Unable to allocate 9 GiB"])
+def test_exhausted_memory_is_reported(
+    visup: Call, monkeypatch: pytest.MonkeyPatch, message: str
 ) -> None:
     def full() -> None:
-        raise MemoryError(said)
+        raise MemoryError(message)
 
     monkeypatch.setattr("visup.cli.check_memory", full)
-    told = visup("presets")
-    assert told.code == 1
-    assert told.err.startswith(f"error: out of memory{said and ': '}{said}\n  hint: ")
+    result = visup("presets")
+    assert result.code == 1
+    assert result.err.startswith(f"error: out of memory{message and ': '}{message}\n  hint: ")
 
 
 ASKED_FROM_PYTHON = """
@@ -290,15 +292,15 @@ except visup.VisupError as error:
 
 @pytest.mark.parametrize("megabytes", [400, 600, 800, 1200])
 @pytest.mark.parametrize(
-    ("words", "code"),
+    ("arguments", "code"),
     [(("-m", "visup.cli", "watch", "clip.mp4"), 2), (("-c", ASKED_FROM_PYTHON), 1)],
 )
-def test_too_little_memory_is_told_and_not_died_of(
-    words: tuple[str, ...], code: int, megabytes: int, tmp_path: Path
+def test_too_little_memory_is_an_error_without_a_traceback(
+    arguments: tuple[str, ...], code: int, megabytes: int, tmp_path: Path
 ) -> None:
     resource = pytest.importorskip("resource", reason="this system has no limits of memory")
     done = subprocess.run(
-        [sys.executable, *words],
+        [sys.executable, *arguments],
         capture_output=True,
         text=True,
         check=False,

@@ -28,7 +28,7 @@ from visup.report.motion_debug.panels import (
 )
 
 SIZE = (192, 144)
-Seen = tuple[Frame, SegmentationTrace, tuple[Region, ...]]
+SegmentedFrame = tuple[Frame, SegmentationTrace, tuple[Region, ...]]
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +37,7 @@ def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def seen() -> Seen:
+def segmented() -> SegmentedFrame:
     """The disc after a second: it goes one pixel per frame to the right."""
     segmenter = MotionSegmenter()
     for n, image in enumerate(moving_disc(30, SIZE)):
@@ -47,8 +47,8 @@ def seen() -> Seen:
     return frame, segmenter.trace, regions
 
 
-def run(monkeypatch: pytest.MonkeyPatch, *words: object) -> int:
-    monkeypatch.setattr(sys, "argv", ["visup", "debug", "motion", *map(str, words)])
+def run(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
+    monkeypatch.setattr(sys, "argv", ["visup", "debug", "motion", *map(str, arguments)])
     try:
         main()
     except SystemExit as end:
@@ -62,7 +62,7 @@ def panels(picture: NDArray[np.uint8]) -> list[NDArray[np.uint8]]:
     return [part for row in rows for part in (row[:, : half_w - 2], row[:, half_w + 2 :])]
 
 
-def test_the_video_has_every_frame_that_was_asked_for(
+def test_the_video_has_the_requested_frames(
     clip: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -73,8 +73,8 @@ def test_the_video_has_every_frame_that_was_asked_for(
     assert capsys.readouterr().out == f"12 frames in {out}\n"
     video = cv2.VideoCapture(str(out))
     pictures = []
-    while (got := video.read())[0]:
-        pictures.append(got[1])
+    while (frame := video.read())[0]:
+        pictures.append(frame[1])
     assert len(pictures) == 12
     assert pictures[0].shape[1] == 1284
     for panel in panels(np.asarray(pictures[-1], np.uint8)):
@@ -82,28 +82,28 @@ def test_the_video_has_every_frame_that_was_asked_for(
         assert np.ptp(panel.astype(int), axis=2).max() > 60  # something in it is coloured
 
 
-def test_panels_tell_the_disc_from_the_ground(seen: Seen) -> None:
-    _, trace, regions = seen
+def test_panels_distinguish_the_disc_from_the_background(segmented: SegmentedFrame) -> None:
+    _, trace, regions = segmented
     assert len(regions) == 1
     speed, layer = velocities(trace)
     (key,) = (k for k, t in enumerate(trace.tracks, 1) if t.id == regions[0].id)
     assert np.allclose(np.median(speed[layer == key], axis=0), (25, 0), atol=2)
     assert np.allclose(np.median(speed[layer == 0], axis=0), 0, atol=2)
     for m in trace.scene.measured:
-        by = explained_by(trace, m)
+        explained = explained_by(trace, m)
         x, y = m.constraints.xy.T
         inside = np.hypot(x - regions[0].centroid[0], y - regions[0].centroid[1]) < 9
-        assert (by[inside] == key).mean() > 0.8
+        assert (explained[inside] == key).mean() > 0.8
         assert (
-            by[np.hypot(x - regions[0].centroid[0], y - regions[0].centroid[1]) > 40] <= 0
+            explained[np.hypot(x - regions[0].centroid[0], y - regions[0].centroid[1]) > 40] <= 0
         ).all()
-    words = [text for text, _ in layer_rows(trace)]
-    assert words[0].startswith("background")
-    assert any(text.startswith(f"{regions[0].id} (layer ") and "+25." in text for text in words)
+    texts = [text for text, _ in layer_rows(trace)]
+    assert texts[0].startswith("background")
+    assert any(text.startswith(f"{regions[0].id} (layer ") and "+25." in text for text in texts)
 
 
-def test_a_picture_is_a_pure_function_and_keeps_its_size(seen: Seen) -> None:
-    frame, trace, regions = seen
+def test_drawing_is_pure_and_its_size_constant(segmented: SegmentedFrame) -> None:
+    frame, trace, regions = segmented
     before = frame.image.copy()
     picture = draw_motion(frame, trace, regions)
     assert np.array_equal(picture, draw_motion(frame, trace, regions))
@@ -112,29 +112,29 @@ def test_a_picture_is_a_pure_function_and_keeps_its_size(seen: Seen) -> None:
     assert draw_motion(frame, None, ()).shape == picture.shape
 
 
-def test_mixed_superpixels_are_uncertain(seen: Seen) -> None:
-    _, trace, _ = seen
+def test_mixed_superpixels_are_uncertain(segmented: SegmentedFrame) -> None:
+    _, trace, _ = segmented
     count, labels = trace.posterior.shape
     sure = np.zeros((count, labels), np.float32)
     sure[:, 0] = 1
     even = np.full((count, labels), 1 / labels, np.float32)
     for posterior, unsure in ((sure, False), (even, True)):
-        known = replace(trace, posterior=posterior)
-        colours, uncertain = label_colours(known)
+        changed = replace(trace, posterior=posterior)
+        colours, uncertain = label_colours(changed)
         assert (uncertain == unsure).all()
         assert (colours.max() > 0) == unsure
 
 
-def test_opposite_ways_have_complementary_colours() -> None:
+def test_opposite_motions_have_complementary_colours() -> None:
     angle = np.linspace(0, 2 * np.pi, 13)
-    way = 100 * np.stack([np.cos(angle), np.sin(angle)], axis=1).astype(np.float32)
-    there, back = flow_colours(way), flow_colours(-way)
-    assert np.allclose(there + back, (there + back)[0], atol=6)
+    flow = 100 * np.stack([np.cos(angle), np.sin(angle)], axis=1).astype(np.float32)
+    forth, back = flow_colours(flow), flow_colours(-flow)
+    assert np.allclose(forth + back, (forth + back)[0], atol=6)
     assert np.allclose(flow_colours(np.zeros((1, 2), np.float32)), 255)
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("arguments", "message"),
     [
         (("nothing.mp4",), "no such file"),
         (("CLIP", "--out", "seen.mp4"), ".webm"),
@@ -143,23 +143,23 @@ def test_opposite_ways_have_complementary_colours() -> None:
         (("CLIP", "--limit", "0"), "--limit"),
     ],
 )
-def test_bad_input_is_one_message(
+def test_bad_input_gives_one_message(
     clip: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
-    words: tuple[str, ...],
-    told: str,
+    arguments: tuple[str, ...],
+    message: str,
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert run(monkeypatch, *(clip if w == "CLIP" else w for w in words)) == 2
+    assert run(monkeypatch, *(clip if w == "CLIP" else w for w in arguments)) == 2
     error = capfd.readouterr().err
-    assert told in error
+    assert message in error
     assert "Traceback" not in error
     assert not list(tmp_path.iterdir())
 
 
-def test_a_mission_is_opened_by_its_video(tmp_path: Path, clip: Path) -> None:
+def test_a_mission_folder_stands_for_its_video(tmp_path: Path, clip: Path) -> None:
     assert video_of(str(tmp_path)) == str(tmp_path)
     (tmp_path / "mission.json").write_text(json.dumps({}))
     (tmp_path / "video.avi").write_bytes(clip.read_bytes())

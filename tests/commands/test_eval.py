@@ -17,19 +17,19 @@ from visup.commands.eval.evaluation import EvaluationCommand
 
 
 @pytest.mark.parametrize("evaluation", EVALUATIONS, ids=lambda e: e.name)
-def test_a_function_takes_what_its_command_gives(evaluation: EvaluationCommand) -> None:
+def test_each_function_accepts_the_options_of_its_command(evaluation: EvaluationCommand) -> None:
     module, _, name = evaluation.function.partition(":")
-    given = [s.name for s in evaluation.settings]
-    given += [evaluation.argument.name] if evaluation.argument else []
-    signature(getattr(import_module(module), name)).bind(**dict.fromkeys([*given, "progress"]))
+    options = [s.name for s in evaluation.settings]
+    options += [evaluation.argument.name] if evaluation.argument else []
+    signature(getattr(import_module(module), name)).bind(**dict.fromkeys([*options, "progress"]))
 
 
-def test_figures_are_shown_and_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_figures_are_printed_and_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # How fast it is has the same form after one round of each size, and only that takes long.
     monkeypatch.setattr(relations, "speed", partial(relations.speed, frames=62, rounds=1))
     file = tmp_path / "figures.json"
-    words = ["relations", "--draws", "5", "--minutes", "0.1", "--json", str(file)]
-    done = CliRunner().invoke(eval_app(), words)
+    arguments = ["relations", "--draws", "5", "--minutes", "0.1", "--json", str(file)]
+    done = CliRunner().invoke(eval_app(), arguments)
     assert done.exit_code == 0, done.output
     assert "of 5 random pairs, RCC-8 is wrong in 0, QTC in 0" in done.output
     record = json.loads(file.read_text())
@@ -38,6 +38,6 @@ def test_figures_are_shown_and_written(tmp_path: Path, monkeypatch: pytest.Monke
     assert record["items"]
 
 
-def test_a_folder_that_is_not_there_is_refused_at_once(tmp_path: Path) -> None:
+def test_a_missing_folder_is_refused_before_the_evaluation(tmp_path: Path) -> None:
     done = CliRunner().invoke(eval_app(), ["motion", str(tmp_path / "nothing")])
     assert "there is no such folder" in str(done.exception)

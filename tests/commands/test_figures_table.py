@@ -26,7 +26,7 @@ def printed(figures: dict[str, Any], keys: tuple[str, ...]) -> list[str]:
     return out.getvalue().splitlines()
 
 
-def told(names: list[str], keys: tuple[str, ...], value: Any) -> dict[str, Any]:
+def uniform_figures(names: list[str], keys: tuple[str, ...], value: Any) -> dict[str, Any]:
     return {
         "items": {n: dict.fromkeys(keys, value) for n in names},
         "total": dict.fromkeys(keys, 1),
@@ -36,11 +36,11 @@ def told(names: list[str], keys: tuple[str, ...], value: Any) -> dict[str, Any]:
 @pytest.mark.parametrize("evaluation", [e for e in EVALUATIONS if e.keys], ids=lambda e: e.name)
 @pytest.mark.parametrize("count", [1, 5, 30])
 @pytest.mark.parametrize("value", [0.123, 12345.6, "in_progress", "interrupted"])
-def test_tables_of_all_evaluations_are_whole_at_80_columns(
+def test_tables_of_all_evaluations_fit_80_columns(
     evaluation: EvaluationCommand, count: int, value: Any
 ) -> None:
     names = [f"droid_chips_noapproach_{n}" for n in range(count)]
-    lines = printed(told(names, evaluation.keys, value), evaluation.keys)
+    lines = printed(uniform_figures(names, evaluation.keys, value), evaluation.keys)
     assert max(map(len, lines)) <= 80
     assert not any("…" in line for line in lines)
 
@@ -56,9 +56,9 @@ def test_tables_of_all_evaluations_are_whole_at_80_columns(
     st.lists(st.from_regex(r"[a-z]{1,40}", fullmatch=True), min_size=1, max_size=12, unique=True),
     VALUES,
 )
-def test_no_figure_is_lost_or_cut(keys: list[str], names: list[str], value: Any) -> None:
+def test_no_figure_is_missing_or_truncated(keys: list[str], names: list[str], value: Any) -> None:
     names = [n for n in names if n != "total"]
-    lines = printed(told(names, tuple(keys), value), tuple(keys))
+    lines = printed(uniform_figures(names, tuple(keys), value), tuple(keys))
     text = "".join(lines)
     assert max(map(len, lines)) <= 80
     assert "…" not in text
@@ -67,6 +67,6 @@ def test_no_figure_is_lost_or_cut(keys: list[str], names: list[str], value: Any)
     assert text.count(full) + text.count("in pr.") >= len(keys) * len(names)
 
 
-def test_what_no_item_has_makes_no_column() -> None:
+def test_figures_that_no_item_has_are_left_out() -> None:
     lines = printed({"items": {"a": {"J": 0.5}}, "total": {"J": 0.5}}, ("J", "F"))
     assert not any("F" in line for line in lines)

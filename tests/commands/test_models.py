@@ -53,9 +53,7 @@ def test_a_database_is_built_listed_and_shown(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("invert", [False, True], ids=["white on black", "black on white"])
-def test_a_picture_is_matched_whatever_its_polarity(
-    zoo: Path, tmp_path: Path, invert: bool
-) -> None:
+def test_a_picture_is_matched_in_either_polarity(zoo: Path, tmp_path: Path, invert: bool) -> None:
     picture = save(np.rot90(ZOO["walker"]), tmp_path / "p.png", invert)
     answer = json.loads(run("match", zoo, picture, "--json", "--top", 2).output)
     assert answer["matches"][0]["object"] == "walker"
@@ -65,7 +63,7 @@ def test_a_picture_is_matched_whatever_its_polarity(
     assert "similarity" in table
 
 
-def test_exemplars_are_added_under_a_name(zoo: Path, tmp_path: Path) -> None:
+def test_silhouettes_are_added_as_a_model(zoo: Path, tmp_path: Path) -> None:
     for k, depth in enumerate((0.1, 0.12, 0.4, 0.42)):
         save(flower(((6, depth),)), tmp_path / "gears" / f"{k}.png")
     added = run("add", zoo, "--name", "gear", "--silhouettes", tmp_path / "gears", "--clusters", 2)
@@ -73,7 +71,7 @@ def test_exemplars_are_added_under_a_name(zoo: Path, tmp_path: Path) -> None:
     assert f"{len(ZOO) + 1} models, {len(ZOO) + 2} views" in added.output
 
 
-def test_masks_of_a_video_are_added_with_what_the_border_cuts(zoo: Path, tmp_path: Path) -> None:
+def test_masks_cut_by_the_border_are_added_as_truncated_views(zoo: Path, tmp_path: Path) -> None:
     whole = ZOO["star"]
     for k in range(6):
         # The star leaves the picture to the left; something else stands beside it.
@@ -84,14 +82,14 @@ def test_masks_of_a_video_are_added_with_what_the_border_cuts(zoo: Path, tmp_pat
     args = ("add", zoo, "--name", "comet", "--masks", tmp_path / "masks", "--label", 7)
     added = run(*args, "--clusters", 3)
     assert added.exit_code == 0, added.output
-    own = [v for v in ModelDatabase.open(zoo).views if v.name == "comet"]
-    assert len(own) == 3
-    assert any(v.cut for v in own)
-    assert not all(v.cut for v in own)
+    views = [v for v in ModelDatabase.open(zoo).views if v.name == "comet"]
+    assert len(views) == 3
+    assert any(v.cut for v in views)
+    assert not all(v.cut for v in views)
     again = run(*args, "--clusters", 1)
     assert again.exit_code == 0, again.output
-    own = [v for v in ModelDatabase.open(zoo).views if v.name == "comet"]
-    assert [v.number for v in own] == [0, 1, 2, 3]
+    views = [v for v in ModelDatabase.open(zoo).views if v.name == "comet"]
+    assert [v.number for v in views] == [0, 1, 2, 3]
 
 
 def make(folder: Path) -> Path:
@@ -99,7 +97,7 @@ def make(folder: Path) -> Path:
     return folder
 
 
-def test_a_match_is_drawn_with_its_reasons(zoo: Path, tmp_path: Path) -> None:
+def test_a_match_is_drawn_with_its_correspondences(zoo: Path, tmp_path: Path) -> None:
     picture, out = save(ZOO["walker"], tmp_path / "p.png"), tmp_path / "why.png"
     drawn = run("match", zoo, picture, "--out", out)
     assert drawn.exit_code == 0, drawn.output
@@ -113,7 +111,7 @@ def test_a_match_is_drawn_with_its_reasons(zoo: Path, tmp_path: Path) -> None:
     assert (image[44:216, 500:920].std(axis=2) > 30).sum() > 500
 
 
-def test_the_table_of_a_match_fits_eighty_columns(
+def test_the_table_of_matches_fits_80_columns(
     zoo: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")
@@ -146,7 +144,7 @@ def test_the_table_of_a_match_fits_eighty_columns(
         (("show", "zoo.db", "--out", "nowhere/a.png"), VisupError),
     ],
 )
-def test_misuse_is_an_error_for_the_user(
+def test_invalid_arguments_are_errors_for_the_user(
     zoo: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -168,7 +166,7 @@ def classes(folder: Path) -> Path:
     return folder
 
 
-def test_classes_that_differ_plainly_are_told_apart(tmp_path: Path) -> None:
+def test_retrieval_separates_clearly_different_classes(tmp_path: Path) -> None:
     figures = evaluate_shapes(classes(tmp_path))
     total = figures["total"]
     assert total["nn1"] == 1.0
@@ -186,7 +184,7 @@ def test_an_evaluation_without_shapes_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not (SHARED / "shapes/kimia99").is_dir(), reason="needs the shared data")
-def test_real_classes_are_told_apart() -> None:
+def test_retrieval_separates_real_classes() -> None:
     total = evaluate_shapes(SHARED / "shapes/kimia99", limit=4)["total"]
     assert total["nn1"] >= 0.95
     assert total["bullseye"] >= 0.95

@@ -38,13 +38,13 @@ def run(visup: Call, recorded: Path, tmp_path: Path) -> Path:
     return tmp_path / "run"
 
 
-def test_a_replay_tells_the_story_again_without_the_video(visup: Call, run: Path) -> None:
+def test_a_replay_gives_the_narrative_without_the_video(visup: Call, run: Path) -> None:
     (run.parent / "clip.avi").unlink()
-    told = visup("replay", run)
-    assert told.code == 0
-    assert "in view" in told.out
-    assert "30 frames replayed in" in told.out
-    assert "Verdict" in told.out
+    result = visup("replay", run)
+    assert result.code == 0
+    assert "in view" in result.out
+    assert "30 frames replayed in" in result.out
+    assert "Verdict" in result.out
 
 
 def test_the_exit_code_says_whether_anything_changes(visup: Call, run: Path) -> None:
@@ -67,7 +67,7 @@ def test_the_exit_code_says_whether_anything_changes(visup: Call, run: Path) -> 
     assert [e["kind"] for e in alerts].count("alert") == 1
 
 
-def test_mistakes_are_told_in_one_message(visup: Call, run: Path) -> None:
+def test_bad_input_gives_one_message(visup: Call, run: Path) -> None:
     nothing = visup("replay", run.parent / "no-such-run")
     assert (nothing.code, "no recorded run" in nothing.err) == (2, True)
     bad = run.parent / "bad.rules"
@@ -82,7 +82,7 @@ def test_mistakes_are_told_in_one_message(visup: Call, run: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("arguments", "message"),
     [
         (("--resume", "run"), "is complete"),
         (("clip.avi", "--resume", "run"), "takes no source"),
@@ -92,9 +92,9 @@ def test_mistakes_are_told_in_one_message(visup: Call, run: Path) -> None:
         (("clip.avi", "--sink", "tape:x"), "cannot be read"),
     ],
 )
-def test_what_cannot_be_resumed_is_told(
-    visup: Call, run: Path, words: tuple[str, ...], said: str
+def test_invalid_resume_options_are_refused(
+    visup: Call, run: Path, arguments: tuple[str, ...], message: str
 ) -> None:
-    told = visup("watch", *words)
-    assert told.code == 2
-    assert said in told.err
+    result = visup("watch", *arguments)
+    assert result.code == 2
+    assert message in result.err

@@ -1,4 +1,4 @@
-"""`visup teach`: outlines on the command line and in briefs, what is told, and what is refused."""
+"""`visup teach`: outlines on the command line and in briefs; messages and refusals."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ def picture(tmp_path: Path) -> Path:
     return path
 
 
-def words(name: str, number: int = 0) -> list[str]:
+def outline_options(name: str, number: int = 0) -> list[str]:
     x, *others = (f"{x},{y}" for x, y in corners(number))
     return ["--outline", f"{name}={x}", *others]
 
 
-def test_outlines_are_stored_told_and_drawn(picture: Path, tmp_path: Path) -> None:
+def test_outlines_are_stored_reported_and_drawn(picture: Path, tmp_path: Path) -> None:
     models = tmp_path / "cell.models"
-    done = run(picture, *words("part"), *words("tray", 9), "--models", models)
+    done = run(picture, *outline_options("part"), *outline_options("tray", 9), "--models", models)
     assert done.exit_code == 0, done.output
     assert f"part: {SIDE} x {SIDE} pixels at (20, {TOP})." in done.output
     assert "has outlines of: part (1 view), tray (1 view)" in done.output
@@ -41,12 +41,12 @@ def test_outlines_are_stored_told_and_drawn(picture: Path, tmp_path: Path) -> No
     drawn = cv2.imread(str(tmp_path / "cell-taught.png"))
     assert drawn is not None
     assert drawn.std() > 20
-    again = run(picture, *words("part"), "--models", models, "--out", tmp_path / "b.png")
+    again = run(picture, *outline_options("part"), "--models", models, "--out", tmp_path / "b.png")
     assert "nothing was added" in again.output
     assert (tmp_path / "b.png").exists()
 
 
-def test_a_brief_says_what_is_outlined_where(tmp_path: Path) -> None:
+def test_a_brief_supplies_clips_and_outlines(tmp_path: Path) -> None:
     folder = tmp_path / "clip"
     folder.mkdir()
     cv2.imwrite(str(tmp_path / "f.png"), frame(0))
@@ -54,8 +54,8 @@ def test_a_brief_says_what_is_outlined_where(tmp_path: Path) -> None:
     video = cv2.VideoWriter(str(folder / "clip.mp4"), kind, 25.0, (160, 120))
     video.write(frame(0))
     video.release()
-    told = {"teach": {"part": {"clip": "clip", "frame": 0, "polygon": corners(0)}}}
-    (folder / "brief.json").write_text(json.dumps(told))
+    brief = {"teach": {"part": {"clip": "clip", "frame": 0, "polygon": corners(0)}}}
+    (folder / "brief.json").write_text(json.dumps(brief))
     done = run("--brief", folder / "brief.json", "--models", tmp_path / "a.models")
     assert done.exit_code == 0, done.output
     assert "part (1 view)" in done.output
@@ -66,15 +66,15 @@ def test_a_brief_says_what_is_outlined_where(tmp_path: Path) -> None:
     [
         ([], "--models DB"),
         (["--models", "a"], "no clip was given to draw outlines in"),
-        (["no.mp4", "--models", "a", *words("part")], "no.mp4"),
+        (["no.mp4", "--models", "a", *outline_options("part")], "no.mp4"),
         (["cell.png", "--models", "a", "--outline", "part"], "has no name"),
-        (["cell.png", "--models", "a", *words("part"), "--frame", "4"], "no frame 4"),
+        (["cell.png", "--models", "a", *outline_options("part"), "--frame", "4"], "no frame 4"),
         (["cell.png", "--models", "a", "--brief", "b.json"], "a brief already contains"),
         (["--models", "a", "--brief", "b.json"], "cannot be read"),
-        (["cell.png", "--models", "no/a", *words("part")], "cannot be written"),
+        (["cell.png", "--models", "no/a", *outline_options("part")], "cannot be written"),
     ],
 )
-def test_what_cannot_be_taught_is_told(
+def test_invalid_input_is_refused(
     picture: Path, monkeypatch: pytest.MonkeyPatch, args: list[str], message: str
 ) -> None:
     monkeypatch.chdir(picture.parent)
@@ -84,7 +84,7 @@ def test_what_cannot_be_taught_is_told(
     assert not Path("a").exists()
 
 
-def test_models_are_added_where_there_is_no_database_yet(tmp_path: Path) -> None:
+def test_adding_models_creates_the_database(tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "silhouettes.png"), frame(0)[:, :, 2])
     folder = tmp_path / "pictures"
     folder.mkdir()

@@ -26,94 +26,112 @@ from visup.testing import (
     region_of,
 )
 
-Does = Callable[[Any, Any, Any], Any]
-TICKET = itertools.count()
+Perceive = Callable[[Any, Any, Any], Any]
+COUNTER = itertools.count()
 
 
-def plug(does: Does, **declared: Any) -> type:
+def behaviour_class(perceive_one: Perceive, **declared: Any) -> type:
     class Plug:
         contract = Contract("plug", gives=("x",), **declared)
 
         def __init__(self) -> None:
-            self.kept: list[Any] = []
+            self.indices: list[Any] = []
 
         def perceive(self, frame: Any, observation: Any, directives: Any) -> Any:
-            return [self.contract.percept(frame, does(self, frame, observation))]
+            return [self.contract.percept(frame, perceive_one(self, frame, observation))]
 
     return Plug
 
 
-def write(self: Any, frame: Any, seen: Any) -> int:
+def write(self: Any, frame: Any, observation: Any) -> int:
     frame.image[0, 0] = 255
     return 0
 
 
-def keep(self: Any, frame: Any, seen: Any) -> Any:
-    self.kept.append(frame.index)
-    return self.kept
+def keep(self: Any, frame: Any, observation: Any) -> Any:
+    self.indices.append(frame.index)
+    return self.indices
 
 
-CHEATS: dict[str, tuple[type, str]] = {
-    "raises": (plug(lambda s, f, seen: 1 / 0), "runs on a disc that moves: frame 0: ZeroDivision"),
-    "black": (plug(lambda s, f, seen: 1 / int(f.image.max())), "runs on black: frame 0: ZeroDivi"),
-    "size": (plug(lambda s, f, seen: int(f.image[100, 100, 0])), "runs on an odd size"),
+VIOLATIONS: dict[str, tuple[type, str]] = {
+    "raises": (
+        behaviour_class(lambda s, f, observation: 1 / 0),
+        "runs on a disc that moves: frame 0: ZeroDivision",
+    ),
+    "black": (
+        behaviour_class(lambda s, f, observation: 1 / int(f.image.max())),
+        "runs on black: frame 0: ZeroDivi",
+    ),
+    "size": (
+        behaviour_class(lambda s, f, observation: int(f.image[100, 100, 0])),
+        "runs on an odd size",
+    ),
     "number": (
-        plug(lambda s, f, seen: float("nan")),
+        behaviour_class(lambda s, f, observation: float("nan")),
         "reported 'x' as nan; expected a finite number",
     ),
-    "writes": (plug(write), "read-only"),
-    "keeps": (plug(keep), "percepts of earlier frames changed later"),
-    "chance": (plug(lambda s, f, seen: next(TICKET)), "is deterministic: a second run"),
-    "slow": (plug(lambda s, f, seen: time.sleep(0.002), cost_ms=1), "keeps its budget: "),
-    "unknown need": (plug(lambda s, f, seen: 0, needs=("smell",)), "have no 'smell'"),
+    "writes": (behaviour_class(write), "read-only"),
+    "keeps": (behaviour_class(keep), "percepts of earlier frames changed later"),
+    "chance": (
+        behaviour_class(lambda s, f, observation: next(COUNTER)),
+        "is deterministic: a second run",
+    ),
+    "slow": (
+        behaviour_class(lambda s, f, observation: time.sleep(0.002), cost_ms=1),
+        "keeps its budget: ",
+    ),
+    "unknown need": (
+        behaviour_class(lambda s, f, observation: 0, needs=("smell",)),
+        "have no 'smell'",
+    ),
 }
 
 
-@pytest.mark.parametrize("name", sorted(CHEATS))
-def test_a_cheat_is_found(name: str) -> None:
-    cheat, message = CHEATS[name]
+@pytest.mark.parametrize("name", sorted(VIOLATIONS))
+def test_each_violation_is_found(name: str) -> None:
+    violating, message = VIOLATIONS[name]
     with pytest.raises(AssertionError) as caught:
-        check_behaviour(cheat)
+        check_behaviour(violating)
     assert message in str(caught.value).replace("\n", " ").replace("  ", " ")
 
 
-class Held:
-    contract = Contract("held", gives=("x",), isolate=True)
+class Unpicklable:
+    contract = Contract("unpicklable", gives=("x",), isolate=True)
 
     def __init__(self) -> None:
-        self.held = (n for n in range(3))
+        self.generator = (n for n in range(3))
 
     def perceive(self, frame: Any, observation: Any, directives: Any) -> Any:
         return ()
 
 
-def test_what_cannot_be_sent_to_its_process_is_found() -> None:
-    failed = [f.check for f in check_results(Held) if not f.passed]
+def test_a_behaviour_that_cannot_be_pickled_is_found() -> None:
+    failed = [f.check for f in check_results(Unpicklable) if not f.passed]
     assert failed == ["can be sent to a process of its own"]
 
 
 @pytest.mark.parametrize("kind", [HealthBehaviour, MotionBehaviour])
-def test_visups_own_behaviours_keep_their_contracts(kind: type) -> None:
+def test_shipped_behaviours_keep_their_contracts(kind: type) -> None:
     check_behaviour(kind)
 
 
-def test_an_instance_will_do_and_does_not_run_itself() -> None:
-    given = Scripted("lamp", ("lamp",), lambda frame: 1.0)
-    check_behaviour(given)
-    assert given.directives == []
+def test_an_instance_is_copied_before_it_is_checked() -> None:
+    behaviour = Scripted("lamp", ("lamp",), lambda frame: 1.0)
+    check_behaviour(behaviour)
+    assert behaviour.directives == []
 
 
-def test_what_is_needed_comes_from_what_is_true() -> None:
-    def count(self: Any, frame: Any, seen: Any) -> int:
-        return len(seen.of("region")) + len(seen.of("smell"))
+def test_needed_percepts_come_from_the_ground_truth() -> None:
+    def count(self: Any, frame: Any, observation: Any) -> int:
+        return len(observation.of("region")) + len(observation.of("smell"))
 
-    needy = plug(count, needs=("region", "smell"))
-    found = check_results(needy, provide={"smell": lambda frame: "roses"})
-    assert all(f.passed for f in found)
-    assert any(f.detail.endswith("percepts: x") for f in found)
+    behaviour = behaviour_class(count, needs=("region", "smell"))
+    results = check_results(behaviour, provide={"smell": lambda frame: "roses"})
+    assert all(f.passed for f in results)
+    assert any(f.detail.endswith("percepts: x") for f in results)
 
 
-def test_the_truth_of_a_clip_is_true() -> None:
+def test_the_ground_truth_of_clips_is_correct() -> None:
     for shot in disc(8):
         (region,) = shot.regions
         full = region.full_mask(shot.frame.size)
@@ -124,7 +142,7 @@ def test_the_truth_of_a_clip_is_true() -> None:
     assert min(area for (area,) in areas) < 0.8 * areas[0][0]  # the second one hides it in part
 
 
-def test_a_region_of_a_mask_encloses_it() -> None:
+def test_a_region_has_the_extent_of_its_mask() -> None:
     mask = np.zeros((20, 30), bool)
     mask[5:9, 7:17] = True
     region = region_of(mask, 4)
@@ -132,7 +150,7 @@ def test_a_region_of_a_mask_encloses_it() -> None:
     assert (region.full_mask((30, 20)) == mask).all()
 
 
-def test_a_scripted_source_runs_and_breaks_off() -> None:
+def test_a_scripted_source_can_end_with_a_problem() -> None:
     script = [shot.frame for shot in flat(9, 4)]
     source = ScriptedSource(script, problem="the cable was cut")
     last = Agent([]).run(source)

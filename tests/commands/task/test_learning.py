@@ -21,15 +21,15 @@ assert {ARM, PART} <= set(NAMES)
 @pytest.fixture
 def runs(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Runs `1` to `3` that went well and `spoilt`, in the place of journals."""
-    known = {str(k): pick_run(str(k), k) for k in (1, 2, 3)} | {
+    traces = {str(k): pick_run(str(k), k) for k in (1, 2, 3)} | {
         "spoilt": pick_run("spoilt", 9, "drop")
     }
 
     def trace(run: Path) -> RunTrace:
-        return known[run.name]
+        return traces[run.name]
 
     def minds(run: Path) -> tuple[Mind, ...]:
-        return known[run.name].minds
+        return traces[run.name].minds
 
     monkeypatch.setattr(learning_runs, "run_trace", trace)
     monkeypatch.setattr(learning_runs, "run_minds", minds)
@@ -41,11 +41,11 @@ def test_a_task_is_learned_fitted_covered_and_compared(
     visup: Call, runs: list[str], tmp_path: Path
 ) -> None:
     file = tmp_path / "bring.task"
-    told = visup("task", "learn", *runs, "--bad", "spoilt", "--out", file)
-    assert told.code == 0
-    assert "<bring> ::=" in told.out
+    result = visup("task", "learn", *runs, "--bad", "spoilt", "--out", file)
+    assert result.code == 0
+    assert "<bring> ::=" in result.out
     assert "in 3 of 3 runs" in file.read_text()
-    assert "spoilt: failed" in told.out or "spoilt: in progress" in told.out
+    assert "spoilt: failed" in result.out or "spoilt: in progress" in result.out
     assert visup("task", "check", file).code == 0
     covered = visup("task", "coverage", file, "spoilt", "--json")
     assert (covered.code, json.loads(covered.out)["covered"] < 1.0) == (1, True)
@@ -59,7 +59,7 @@ def test_a_task_is_learned_fitted_covered_and_compared(
     assert "only `dock_with_retry` allows" in other.out
 
 
-def test_what_cannot_be_written_or_read_is_told_at_once(visup: Call, tmp_path: Path) -> None:
+def test_unwritable_and_unreadable_paths_are_reported(visup: Call, tmp_path: Path) -> None:
     nowhere = visup("task", "learn", tmp_path, "--out", tmp_path / "none" / "x.task")
     assert (nowhere.code, "no such folder" in nowhere.err) == (2, True)
     nothing = visup("task", "learn", tmp_path, "--out", tmp_path / "x.task")

@@ -17,14 +17,14 @@ from tests.paths import ROOT
 FOLDER = ROOT / "editors" / "vscode"
 
 
-def built(folder: Path) -> Path:
+def build(folder: Path) -> Path:
     script = [sys.executable, str(FOLDER / "build.py"), str(folder)]
-    told = subprocess.run(script, check=True, capture_output=True, text=True)
-    return Path(told.stdout.strip())
+    done = subprocess.run(script, check=True, capture_output=True, text=True)
+    return Path(done.stdout.strip())
 
 
-def test_the_script_builds_all_that_the_package_names(tmp_path: Path) -> None:
-    with zipfile.ZipFile(built(tmp_path)) as archive:
+def test_the_build_has_every_file_of_the_package(tmp_path: Path) -> None:
+    with zipfile.ZipFile(build(tmp_path)) as archive:
         names = set(archive.namelist())
         package = json.loads(archive.read("extension/package.json"))
         grammars = package["contributes"]["grammars"]
@@ -35,20 +35,20 @@ def test_the_script_builds_all_that_the_package_names(tmp_path: Path) -> None:
             for g in grammars
         }
     assert {"[Content_Types].xml", "extension.vsixmanifest", "extension/extension.js"} <= names
-    assert all(scope == own for scope, own in scopes.items())
+    assert all(scope == declared for scope, declared in scopes.items())
     extensions = {e for k in package["contributes"]["languages"] for e in k["extensions"]}
     assert extensions == {".task", ".rules"}
 
 
-def test_the_same_sources_give_the_same_bytes(tmp_path: Path) -> None:
-    first = built(tmp_path).read_bytes()
-    assert built(tmp_path).read_bytes() == first
+def test_the_build_is_reproducible(tmp_path: Path) -> None:
+    first = build(tmp_path).read_bytes()
+    assert build(tmp_path).read_bytes() == first
 
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="there is no node to run the extension in")
-def test_a_headless_run_finds_and_mends_a_mistake(tmp_path: Path) -> None:
+def test_a_headless_run_finds_and_fixes_a_mistake(tmp_path: Path) -> None:
     pytest.importorskip("pygls", reason="the extra `lsp` is not installed")
-    with zipfile.ZipFile(built(tmp_path)) as archive:
+    with zipfile.ZipFile(build(tmp_path)) as archive:
         archive.extractall(tmp_path)
     command = tmp_path / "visup"
     command.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m visup.cli "$@"\n')
@@ -58,8 +58,8 @@ def test_a_headless_run_finds_and_mends_a_mistake(tmp_path: Path) -> None:
         run, check=False, capture_output=True, text=True, timeout=60, cwd=ROOT, env=os.environ
     )
     assert done.returncode == 0, done.stderr
-    told = json.loads(done.stdout)
-    assert "unknown action `cupled`" in told["message"]
-    assert told["fix"] == "coupled"
-    assert told["tokens"] == 20  # four names: stage, action, two actors
-    assert told["providers"] == 12
+    report = json.loads(done.stdout)
+    assert "unknown action `cupled`" in report["message"]
+    assert report["fix"] == "coupled"
+    assert report["tokens"] == 20  # four names: stage, action, two actors
+    assert report["providers"] == 12
