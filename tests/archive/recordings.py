@@ -16,12 +16,12 @@ from visup.runs.wiring import final_verdict, reasoning_agent
 from visup.version import __version__
 
 
-def meeting(count: int = 60, gone_at: int = 45, shift: float = 0.0) -> Iterator[Observation]:
+def meeting(count: int = 60, exit_frame: int = 45, shift: float = 0.0) -> Iterator[Observation]:
     """An arm that comes up to a satellite and goes back; a third body leaves the picture."""
     for i in range(count):
         x = 100.0 + shift + 8.0 * min(i, 60 - i)
         regions = [box_region(1, (x, 200, 80, 60)), box_region(2, (400, 180, 90, 100))]
-        if i < gone_at:
+        if i < exit_frame:
             regions.append(box_region(3, (120, 20 + i, 60, 50)))
         names = {1: [("arm", 0.9), ("spartan", 0.3)], 2: [("spartan", 0.9), ("arm", 0.2)]}
         yield seen(i, regions, 10.0, names)
@@ -43,8 +43,8 @@ def record(
         visup=__version__, source="clip.mp4", fps=10.0, settings=to_jsonable(settings), live=False
     )
     steps = []
-    for perceived in observations:
-        steps.append(agent.reason(perceived))
+    for observation in observations:
+        steps.append(agent.reason(observation))
         journal.record(steps[-1])
     verdict = final_verdict(agent.mind).value if agent.mind.tasks else None
     journal.note(verdict=verdict, steps=len(steps), **facts)

@@ -1,4 +1,4 @@
-"""Chunks of a long video, watched beside each other: stitched they are the run that was never cut."""
+"""Chunks of a long video, watched in parallel and stitched: the result is the run of the whole video."""
 
 from __future__ import annotations
 
@@ -41,27 +41,29 @@ DOCK = WatchSettings("clip.mp4", tasks=("dock",), actors={"satellite": ("spartan
 
 
 @dataclass(frozen=True, slots=True)
-class Perceived(Recording):
+class ScriptedRecording(Recording):
     """A chunk whose recording is a list."""
 
     path: Path = Path("nowhere")
-    seen: list[Observation] = field(default_factory=list)
+    recorded: list[Observation] = field(default_factory=list)
 
     def observations(self, after: int = -1) -> Iterator[Observation]:
-        return (o for o in list(self.seen) if o.frame_index > after)
+        return (o for o in list(self.recorded) if o.frame_index > after)
 
     def first_and_last(self) -> tuple[int, int] | None:
-        return (self.seen[0].frame_index, self.seen[-1].frame_index) if self.seen else None
+        return (
+            (self.recorded[0].frame_index, self.recorded[-1].frame_index) if self.recorded else None
+        )
 
 
-def chunk(begin: int, end: int | None, own: Sequence[int] = (1, 2, 3)) -> Perceived:
-    """The meeting as a chunk sees it, which calls the regions by numbers of its own."""
-    named = RegionNumbers(dict(enumerate(own, 1)))
-    return Perceived(seen=[named.renumbered(o) for o in WHOLE[begin:end]])
+def chunk(begin: int, end: int | None, region_ids: Sequence[int] = (1, 2, 3)) -> ScriptedRecording:
+    """Part of the meeting as recorded by a chunk, with region ids of its own."""
+    renumbering = RegionNumbers(dict(enumerate(region_ids, 1)))
+    return ScriptedRecording(recorded=[renumbering.renumbered(o) for o in WHOLE[begin:end]])
 
 
 def without(observation: Observation, region: int) -> Observation:
-    """The same, but for one region that was not seen."""
+    """An observation without one of its regions."""
     reports = tuple(
         replace(r, percepts=tuple(p for p in r.percepts if _about(p.value) != region))
         for r in observation.reports
@@ -73,8 +75,8 @@ def _about(value: object) -> object:
     return getattr(value, "region_id", getattr(value, "id", None))
 
 
-def refused(chunk: Recording, end: int) -> None:
-    raise AssertionError("nothing is to be watched on")
+def no_extension(chunk: Recording, end: int) -> None:
+    raise AssertionError("no chunk is to be extended")
 
 
 def ids(observations: Iterable[Observation]) -> list[list[int]]:
@@ -87,20 +89,20 @@ def events(observations: Sequence[Observation]) -> list[object]:
 
 
 @pytest.fixture(scope="module")
-def told() -> list[object]:
-    """What is told of the meeting that was never cut."""
+def whole_events() -> list[object]:
+    """The events of the meeting, not cut into chunks."""
     return events(WHOLE)
 
 
 @given(frames=st.integers(0, 5000), length=st.integers(1, 400), warm_up=st.integers(0, 60))
-def test_chunks_look_at_every_frame(frames: int, length: int, warm_up: int) -> None:
+def test_chunks_cover_every_frame(frames: int, length: int, warm_up: int) -> None:
     spans = chunk_spans(frames, length, warm_up)
     assert (spans[0].begin, spans[-1].end) == (0, None)
-    for one, other in pairwise(spans):
-        assert one.end is not None
-        assert one.begin <= other.begin <= one.end
-        assert one.end - other.begin == 2 * warm_up or other.begin == 0
-        assert one.end - warm_up - (one.begin + warm_up) <= 2 * length
+    for chunk_span, next_span in pairwise(spans):
+        assert chunk_span.end is not None
+        assert chunk_span.begin <= next_span.begin <= chunk_span.end
+        assert chunk_span.end - next_span.begin == 2 * warm_up or next_span.begin == 0
+        assert chunk_span.end - warm_up - (chunk_span.begin + warm_up) <= 2 * length
 
 
 @settings(deadline=None, max_examples=5)
@@ -108,75 +110,77 @@ def test_chunks_look_at_every_frame(frames: int, length: int, warm_up: int) -> N
     edges=st.tuples(st.integers(12, 20), st.integers(26, 40)),
     numbers=st.tuples(*[st.permutations([1, 2, 3, 7])] * 2),
 )
-def test_what_is_cut_and_stitched_gives_the_same_events(
-    told: list[object], edges: tuple[int, int], numbers: tuple[list[int], list[int]]
+def test_stitched_chunks_give_the_events_of_the_whole(
+    whole_events: list[object], edges: tuple[int, int], numbers: tuple[list[int], list[int]]
 ) -> None:
     a, b = edges
     chunks = [chunk(0, a + 6), chunk(a - 6, b + 6, numbers[0]), chunk(b - 6, None, numbers[1])]
-    found = list(stitched(find_parts(chunks, refused)))
-    assert [o.frame_index for o in found] == list(range(len(WHOLE)))
-    assert ids(found) == ids(WHOLE)
-    assert events(found) == told
+    observations = list(stitched(find_parts(chunks, no_extension)))
+    assert [o.frame_index for o in observations] == list(range(len(WHOLE)))
+    assert ids(observations) == ids(WHOLE)
+    assert events(observations) == whole_events
 
 
-def test_a_chunk_is_watched_on_until_both_see_alike() -> None:
+def test_a_chunk_is_extended_until_both_observe_the_same() -> None:
     old, new = chunk(0, 20), chunk(10, None, (2, 1, 3))
-    new.seen[:15] = [without(o, 1) for o in new.seen[:15]]  # until frame 25
-    asked = list[int]()
+    new.recorded[:15] = [without(o, 1) for o in new.recorded[:15]]  # until frame 25
+    requested = list[int]()
 
     def extend(on: Recording, end: int) -> None:
-        asked.append(end)
-        old.seen.extend(WHOLE[len(old.seen) : end])
+        requested.append(end)
+        old.recorded.extend(WHOLE[len(old.recorded) : end])
 
     parts = find_parts([old, new], extend)
-    assert asked == [70]  # five seconds on
+    assert requested == [70]  # five seconds on
     assert parts[1].first >= 25
     assert ids(stitched(parts)) == ids(WHOLE)
 
 
-def test_two_that_never_agree_are_stitched_after_a_while_and_of_others_the_first_goes_on() -> None:
+def test_chunks_that_never_agree_are_merged_or_stitched_at_the_limit() -> None:
     old, end = chunk(0, 20), len(WHOLE)
 
     def extend(on: Recording, end: int) -> None:
-        old.seen.extend(WHOLE[len(old.seen) : end])
+        old.recorded.extend(WHOLE[len(old.recorded) : end])
 
-    never = Perceived(seen=[without(o, 1) for o in WHOLE[10:]])
+    never = ScriptedRecording(recorded=[without(o, 1) for o in WHOLE[10:]])
     (only,) = find_parts([old, never], extend)
-    assert (only.chunk, len(old.seen)) == (old, end)
+    assert (only.chunk, len(old.recorded)) == (old, end)
     stays = chunk(0, 20)
     parts = find_parts([stays, never], lambda on, end: None)
     assert 15 <= parts[1].first < 20
-    found = list(stitched(parts))
-    assert [o.frame_index for o in found] == list(range(end))
-    assert ids(found)[:15] == ids(WHOLE)[:15]
+    observations = list(stitched(parts))
+    assert [o.frame_index for o in observations] == list(range(end))
+    assert ids(observations)[:15] == ids(WHOLE)[:15]
 
 
-def test_what_only_the_later_chunk_sees_gets_a_number_that_nobody_had() -> None:
-    old = Perceived(seen=[without(without(o, 2), 3) for o in WHOLE[:30]])
-    found = list(stitched(find_parts([old, chunk(20, None)], lambda on, end: None)))
-    assert {r.id for o in found for r in o.of("region")} == {1, 2, 3}
-    assert {h.region_id for o in found for h in o.of("hypothesis")} <= {1, 2, 3}
+def test_a_region_of_only_the_later_chunk_gets_a_new_id() -> None:
+    old = ScriptedRecording(recorded=[without(without(o, 2), 3) for o in WHOLE[:30]])
+    observations = list(stitched(find_parts([old, chunk(20, None)], lambda on, end: None)))
+    assert {r.id for o in observations for r in o.of("region")} == {1, 2, 3}
+    assert {h.region_id for o in observations for h in o.of("hypothesis")} <= {1, 2, 3}
 
 
-def test_a_later_chunk_without_a_frame_is_passed_over() -> None:
-    found = list(stitched(find_parts([chunk(0, 20), chunk(14, None), Perceived()], refused)))
-    assert [o.frame_index for o in found] == list(range(len(WHOLE)))
+def test_an_empty_chunk_is_skipped() -> None:
+    observations = list(
+        stitched(find_parts([chunk(0, 20), chunk(14, None), ScriptedRecording()], no_extension))
+    )
+    assert [o.frame_index for o in observations] == list(range(len(WHOLE)))
 
 
-def test_a_chunk_that_is_watched_on_is_as_one_that_was_watched_at_once(tmp_path: Path) -> None:
+def test_an_extended_chunk_equals_one_watched_at_once(tmp_path: Path) -> None:
     clip = WatchSettings(str(write_clip(tmp_path / "disc.avi", moving_disc(24))))
     for name, end in (("cut", 16), ("whole", 22)):
         (tmp_path / name).mkdir()
         watch_into(clip, tmp_path / name, (4, end))
-    one, other = (Recording.open(tmp_path / name) for name in ("cut", "whole"))
-    extend_chunk(clip, one, 22)
-    assert one.first_and_last() == other.first_and_last() == (4, 21)
-    assert [to_document(o) for o in one.observations()] == [
-        to_document(o) for o in other.observations()
+    extended, complete = (Recording.open(tmp_path / name) for name in ("cut", "whole"))
+    extend_chunk(clip, extended, 22)
+    assert extended.first_and_last() == complete.first_and_last() == (4, 21)
+    assert [to_document(o) for o in extended.observations()] == [
+        to_document(o) for o in complete.observations()
     ]
 
 
-def test_a_span_of_a_video_gives_those_frames_at_their_times(tmp_path: Path) -> None:
+def test_a_span_of_a_video_has_its_frames_and_times(tmp_path: Path) -> None:
     path = write_clip(tmp_path / "disc.avi", moving_disc(12))
     with open_video(WatchSettings(str(path))) as source:
         whole = [(f.index, f.time, f.image.tobytes()) for f in source]
@@ -185,15 +189,15 @@ def test_a_span_of_a_video_gives_those_frames_at_their_times(tmp_path: Path) -> 
 
 
 def chunked(settings: WatchSettings, folder: Path, span: tuple[int, int | None]) -> None:
-    """A chunk of the meeting that `scripted` sees whole."""
+    """A chunk of the meeting that `scripted` records whole."""
     if Path(settings.source).read_text().startswith("half") and span[0]:
         raise RuntimeError("the fuse blew")
     shift = float(Path(settings.source).read_text().removeprefix("half"))
     record(folder, tuple(meeting(12, shift=shift))[slice(*span)], settings)
 
 
-def filled(lake: Lake, some: list[Clip], watch: object = chunked) -> FillResult:
-    plan = make_plan(lake, some, WatchSettings(""))
+def fill_in_chunks(lake: Lake, chunk_clips: list[Clip], watch: object = chunked) -> FillResult:
+    plan = make_plan(lake, chunk_clips, WatchSettings(""))
     spans = chunk_spans(12, 6, 3)
     jobs = tuple(replace(job, spans=spans) for job in plan.jobs)
     return fill(lake, Plan(jobs, plan.present), Pool(), lambda outcome: None, watch)  # type: ignore[arg-type]
@@ -203,25 +207,31 @@ def rows(lake: Lake) -> dict[str, list[object]]:
     return {name: list(lake.rows(name)) for name in TABLES}
 
 
-def test_a_lake_of_chunks_is_that_of_whole_clips(tmp_path: Path) -> None:
-    some = clips(tmp_path / "clips", "1", "2")
+def test_a_lake_filled_in_chunks_equals_one_of_whole_clips(tmp_path: Path) -> None:
+    clip_list = clips(tmp_path / "clips", "1", "2")
     lake, whole = Lake.create(tmp_path / "lake"), Lake.create(tmp_path / "whole")
-    assert filled(lake, some).added == 2
-    fill(whole, make_plan(whole, some, WatchSettings("")), Pool(), lambda outcome: None, scripted)
+    assert fill_in_chunks(lake, clip_list).added == 2
+    fill(
+        whole,
+        make_plan(whole, clip_list, WatchSettings("")),
+        Pool(),
+        lambda outcome: None,
+        scripted,
+    )
     assert rows(lake) == rows(whole)
     assert not (lake.path / "chunks").exists()
 
 
-def test_chunks_that_are_watched_are_not_watched_again(tmp_path: Path) -> None:
-    some, lake = clips(tmp_path / "clips", "1"), Lake.create(tmp_path / "lake")
-    begun = list[tuple[int, int | None]]()
+def test_finished_chunks_are_not_watched_again(tmp_path: Path) -> None:
+    clip_list, lake = clips(tmp_path / "clips", "1"), Lake.create(tmp_path / "lake")
+    started = list[tuple[int, int | None]]()
 
     class Killed(BaseException):
         """The worker dies."""
 
     def watch(settings: WatchSettings, folder: Path, span: tuple[int, int | None]) -> None:
-        begun.append(span)
-        if len(begun) == 2:
+        started.append(span)
+        if len(started) == 2:
             raise Killed
         chunked(settings, folder, span)
 
@@ -229,53 +239,53 @@ def test_chunks_that_are_watched_are_not_watched_again(tmp_path: Path) -> None:
         with only_filler(lake):
             clear_attempts(lake, retry=False)
             try:
-                filled(lake, some, watch)
+                fill_in_chunks(lake, clip_list, watch)
             except Killed:
                 assert lake.runs() == []
     assert len(lake.runs()) == 1
-    assert begun == [(0, 9), (3, None), (3, None)]
+    assert started == [(0, 9), (3, None), (3, None)]
 
 
-def test_a_chunk_that_fails_fails_its_clip_alone(tmp_path: Path) -> None:
+def test_a_failed_chunk_fails_only_its_clip(tmp_path: Path) -> None:
     lake = Lake.create(tmp_path / "lake")
-    result = filled(lake, clips(tmp_path / "clips", "half1", "2"))
+    result = fill_in_chunks(lake, clips(tmp_path / "clips", "half1", "2"))
     assert (result.added, [f.reason for f in result.failed]) == (
         1,
         ["visup has a fault: RuntimeError: the fuse blew"],
     )
 
 
-def test_a_chunk_that_ends_two_workers_puts_its_clip_aside(tmp_path: Path) -> None:
-    some, lake = clips(tmp_path / "clips", "1"), Lake.create(tmp_path / "lake")
-    (job,) = make_plan(lake, some, WatchSettings("")).jobs
+def test_a_chunk_that_kills_two_workers_sets_its_clip_aside(tmp_path: Path) -> None:
+    clip_list, lake = clips(tmp_path / "clips", "1"), Lake.create(tmp_path / "lake")
+    (job,) = make_plan(lake, clip_list, WatchSettings("")).jobs
     Attempts(lake.path, f"{job.run}-1").exhaust()
-    result = filled(lake, some)
+    result = fill_in_chunks(lake, clip_list)
     assert [f.put_aside for f in result.failed] == [True]
-    assert [f.put_aside for f in make_plan(lake, some, WatchSettings("")).failed] == [True]
+    assert [f.put_aside for f in make_plan(lake, clip_list, WatchSettings("")).failed] == [True]
 
 
 def test_a_video_is_watched_in_chunks(tmp_path: Path) -> None:
     path = write_clip(tmp_path / "disc.avi", moving_disc(50))
     lake, cutting = Lake.create(tmp_path / "lake"), Cutting(1.0, 0.2)
-    some = [Clip(path, taken=0.0)]
-    plan = make_plan(lake, some, WatchSettings(""), cutting)
+    clip_list = [Clip(path, taken=0.0)]
+    plan = make_plan(lake, clip_list, WatchSettings(""), cutting)
     assert plan.jobs[0].spans == (ChunkSpan(0, 30), ChunkSpan(20, None))
-    assert plan.jobs[0].run != make_plan(lake, some, WatchSettings("")).jobs[0].run
+    assert plan.jobs[0].run != make_plan(lake, clip_list, WatchSettings("")).jobs[0].run
     result = fill(lake, plan, Pool(), lambda outcome: None, watch_into)
     assert (result.failed, result.added) == ([], 1)
     (run,) = lake.rows("runs")
     assert (run["steps"], run["ended"], run["source"]) == (50, "complete", str(path))
     recording = Recording.open(lake.folder_of(run["run"]))
     assert [first for first, _ in recording.facts()["chunks"]] == [0, 20]
-    assert make_plan(lake, some, WatchSettings(""), cutting).present == 1
-    assert make_plan(lake, some, WatchSettings(""), Cutting(60.0)).jobs[0].spans == ()
+    assert make_plan(lake, clip_list, WatchSettings(""), cutting).present == 1
+    assert make_plan(lake, clip_list, WatchSettings(""), Cutting(60.0)).jobs[0].spans == ()
 
 
-def test_chunks_that_are_all_warm_up_are_refused(
+def test_chunks_no_longer_than_their_warm_up_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     visup: Call = caller(monkeypatch, capfd)
     write_clip(tmp_path / "disc.avi", moving_disc(20))
-    words = ("archive", "run", tmp_path / "disc.avi", "--into", tmp_path / "lake", "--plan")
-    assert visup(*words, "--chunk", 5).code == 2
-    assert "1 to watch" in visup(*words, "--chunk", 60).out
+    arguments = ("archive", "run", tmp_path / "disc.avi", "--into", tmp_path / "lake", "--plan")
+    assert visup(*arguments, "--chunk", 5).code == 2
+    assert "1 to watch" in visup(*arguments, "--chunk", 60).out

@@ -1,4 +1,4 @@
-"""Looking for conditions: what is found is what an agent would have said, and nothing is left out."""
+"""Searching for conditions: hits agree with what an agent reports in a replay, and none is missing."""
 
 from __future__ import annotations
 
@@ -51,24 +51,24 @@ DOCK = WatchSettings("clip.mp4", tasks=("dock",), actors={"satellite": ("spartan
 @pytest.fixture(scope="module")
 def lake(tmp_path_factory: pytest.TempPathFactory) -> Lake:
     """Runs in which the arm comes near, touches, or never does; one without an arm."""
-    place = tmp_path_factory.mktemp("find")
-    made = Lake.create(place / "lake")
+    folder = tmp_path_factory.mktemp("find")
+    lake = Lake.create(folder / "lake")
     for number, (count, shift) in enumerate([(45, 0.0), (45, 45.0), (25, -90.0), (14, 0.0)]):
-        record(place / f"run-{number}", meeting(count, 20, shift), DOCK)
-        add_run(made, place / f"run-{number}")
-    return made
+        record(folder / f"run-{number}", meeting(count, 20, shift), DOCK)
+        add_run(lake, folder / f"run-{number}")
+    return lake
 
 
 @pytest.fixture(scope="module")
 def database(lake: Lake) -> Iterator[LakeDatabase]:
-    with open_database(lake) as found:
-        yield found
+    with open_database(lake) as opened:
+        yield opened
 
 
 CONDITIONS = random_conditions(24, 23)
 
 
-def test_what_is_found_is_what_the_agent_says(
+def test_hits_agree_with_the_verdicts_of_the_agent(
     lake: Lake, database: LakeDatabase, tmp_path: Path
 ) -> None:
     rules = tmp_path / "all.rules"
@@ -80,23 +80,23 @@ def test_what_is_found_is_what_the_agent_says(
     possible = [set(search.possible_runs(database)) for search in searches]
     for run in lake.runs():
         recording, settings = lake.recorded(run)
-        judges = [PatternEvaluator(s.pattern) for s in searches]
+        evaluators = [PatternEvaluator(s.pattern) for s in searches]
 
-        def look(step: Step, judges: list[PatternEvaluator] = judges) -> None:
+        def compare(step: Step, evaluators: list[PatternEvaluator] = evaluators) -> None:
             nonlocal compared
-            for n, judge in enumerate(judges):
-                judge(step)
-                order = judge.pattern.rule.variables
-                said = verdicts(step.mind, f"f{n}")
-                assert judge.before is not None
-                for reading in judge.before.readings:
-                    meant = dict(zip(order, reading.objects, strict=True))
-                    assert reading.truth == said[meant["a"], meant["b"]], CONDITIONS[n]
+            for n, evaluator in enumerate(evaluators):
+                evaluator(step)
+                order = evaluator.pattern.rule.variables
+                expected = verdicts(step.mind, f"f{n}")
+                assert evaluator.before is not None
+                for reading in evaluator.before.readings:
+                    binding = dict(zip(order, reading.objects, strict=True))
+                    assert reading.truth == expected[binding["a"], binding["b"]], CONDITIONS[n]
                     compared += 1
 
-        replay(recording, replace(settings, rules=(rules,)), on_step=look)
-        for n, judge in enumerate(judges):
-            hits = tuple(h for h in judge.hits() if h.truth == Truth.TRUE)
+        replay(recording, replace(settings, rules=(rules,)), on_step=compare)
+        for n, evaluator in enumerate(evaluators):
+            hits = tuple(h for h in evaluator.hits() if h.truth == Truth.TRUE)
             assert not hits or run in possible[n], CONDITIONS[n]
             if searches[n].quick:
                 assert searches[n].hits(recording, settings) == hits, CONDITIONS[n]
@@ -108,7 +108,7 @@ def test_what_is_found_is_what_the_agent_says(
 
 
 @pytest.mark.parametrize("rule", ["near", "meets", "none_such"])
-def test_rules_are_found_where_a_replay_raises_them(
+def test_rules_are_found_where_a_replay_raises_alerts(
     lake: Lake, database: LakeDatabase, tmp_path: Path, rule: str
 ) -> None:
     when = {
@@ -121,45 +121,45 @@ def test_rules_are_found_where_a_replay_raises_them(
         f'rule {rule}(a, b): warning when {when} hold 0.5 s say "{{a}} {{is}} near {{b}}."'
     )
     search = RulesSearch(file, load_rules(file))
-    found = {f.run: f.hits for f in find(lake, search, search.possible_runs(database))}
+    hits_by_run = {f.run: f.hits for f in find(lake, search, search.possible_runs(database))}
     for run in lake.runs():
         recording, settings = lake.recorded(run)
-        told = replay(recording, replace(settings, rules=(file,))).events
+        events = replay(recording, replace(settings, rules=(file,))).events
         opened = [
             (e["time"], tuple(e["objects"]))
-            for e in told
+            for e in events
             if e["data"].get("alert_kind") == rule and e["kind"] == "alert"
         ]
-        assert [(round(h.begin, 6), h.objects) for h in found.get(run, ())] == opened
+        assert [(round(h.begin, 6), h.objects) for h in hits_by_run.get(run, ())] == opened
 
 
-def test_names_are_those_whom_the_agent_meant(lake: Lake, database: LakeDatabase) -> None:
+def test_names_in_conditions_are_actors_or_models(lake: Lake, database: LakeDatabase) -> None:
     by_actor = ConditionSearch(read_pattern("converging(arm, satellite) for 0.3 s"))
     by_model = ConditionSearch(read_pattern("converging(arm, spartan) for 0.3 s"))
     runs = by_actor.possible_runs(database)
     assert runs == by_model.possible_runs(database)
-    found = [f.hits for f in find(lake, by_actor, runs)]
-    assert [h.names for hits in found for h in hits]
-    assert {h.names for hits in found for h in hits} == {("arm", "spartan")}
-    assert all(0 < (h.confidence or 0) <= 1 for hits in found for h in hits)
+    hits_by_run = [f.hits for f in find(lake, by_actor, runs)]
+    assert [h.names for hits in hits_by_run for h in hits]
+    assert {h.names for hits in hits_by_run for h in hits} == {("arm", "spartan")}
+    assert all(0 < (h.confidence or 0) <= 1 for hits in hits_by_run for h in hits)
     with pytest.raises(QueryError, match="nobody in this lake was ever taken for 'satelite'"):
         ConditionSearch(read_pattern("touching(arm, satelite)")).possible_runs(database)
 
 
 @pytest.mark.parametrize("change", ["gone", "cut", "other"])
-def test_a_run_without_notes_is_reasoned_about_again(
+def test_a_run_without_stored_beliefs_is_replayed(
     lake: Lake, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, change: str
 ) -> None:
     search = read_search("converging(arm, satellite) and then diverging(arm, b) within 1 s")
     run = lake.runs()[0]
     copy = Path(shutil.copytree(lake.folder_of(run), tmp_path / run))
-    notes, settings = copy / BELIEFS, lake.recorded(run)[1]
+    beliefs, settings = copy / BELIEFS, lake.recorded(run)[1]
     assert read_minds(copy) is not None
     hits = search.hits(Recording.open(copy), settings)
     if change == "gone":
-        notes.unlink()
+        beliefs.unlink()
     if change == "cut":
-        notes.write_bytes(notes.read_bytes()[:-200])
+        beliefs.write_bytes(beliefs.read_bytes()[:-200])
     if change == "other":
         monkeypatch.setattr("visup.archive.finding.beliefs.__version__", "0.0")
     assert read_minds(copy) is None
@@ -171,30 +171,30 @@ def test_a_run_without_notes_is_reasoned_about_again(
     [
         ("touching(a, b) and not (exists c: (converging(a, c) and diverging(b, c)))", True),
         ("touching(arm, 2) since[1 s] north_of(arm, 2)", True),
-        ("coupled(a, b)", False),  # judged of what is hidden, too
+        ("coupled(a, b)", False),  # also evaluated for hidden objects
         ("gap(a, b) < 60 px", False),
         ("touching(a, b) and moving(a)", False),
         ("stale(region)", False),
     ],
 )
-def test_conditions_about_relations_alone_need_no_reasoning(text: str, quick: bool) -> None:
+def test_conditions_on_relations_alone_need_no_replay(text: str, quick: bool) -> None:
     assert read_search(text).quick is quick
 
 
-def test_unknown_is_kept_apart_and_looked_for_everywhere(
+def test_unknown_hits_are_separate_and_searched_in_every_run(
     lake: Lake, database: LakeDatabase
 ) -> None:
     pattern = read_pattern("touching(a, b)")
-    sure, all_of_it = ConditionSearch(pattern), ConditionSearch(pattern, unknown=True)
-    assert all_of_it.possible_runs(database) == lake.runs()
-    told = {f.run: f.hits for f in find(lake, all_of_it, lake.runs())}
-    assert {h.truth for hits in told.values() for h in hits} == {"true", "unknown"}
-    for found in find(lake, sure, sure.possible_runs(database)):
-        assert found.hits == tuple(h for h in told[found.run] if h.truth == "true")
+    certain, with_unknown = ConditionSearch(pattern), ConditionSearch(pattern, unknown=True)
+    assert with_unknown.possible_runs(database) == lake.runs()
+    hits_by_run = {f.run: f.hits for f in find(lake, with_unknown, lake.runs())}
+    assert {h.truth for hits in hits_by_run.values() for h in hits} == {"true", "unknown"}
+    for found in find(lake, certain, certain.possible_runs(database)):
+        assert found.hits == tuple(h for h in hits_by_run[found.run] if h.truth == "true")
 
 
 @pytest.mark.parametrize(
-    ("text", "meant"),
+    ("text", "translated"),
     [
         ("f(a)", "f(a)"),
         ("f(a) and g(a)", "f(a) and g(a)"),
@@ -207,12 +207,12 @@ def test_unknown_is_kept_apart_and_looked_for_everywhere(
         ),
     ],
 )
-def test_and_then_is_written_in_the_rule_language(text: str, meant: str) -> None:
-    assert desugared(text) == meant
+def test_and_then_is_translated_to_the_rule_language(text: str, translated: str) -> None:
+    assert desugared(text) == translated
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("and then touching(a, b)", "something is missing beside `and then`"),
         ("touching(a, b) and then", "something is missing beside `and then`"),
@@ -232,55 +232,55 @@ def test_and_then_is_written_in_the_rule_language(text: str, meant: str) -> None
         ("", "there is no condition"),
     ],
 )
-def test_what_is_no_condition_is_refused(text: str, said: str) -> None:
-    with pytest.raises((RuleError, ErrorGroup)) as told:
+def test_invalid_conditions_are_refused(text: str, message: str) -> None:
+    with pytest.raises((RuleError, ErrorGroup)) as caught:
         read_search(text)
-    assert said in str(told.value)
-    assert "watched" not in str(told.value)  # the rule that is made of it
+    assert message in str(caught.value)
+    assert "watched" not in str(caught.value)  # the name of the rule made from it
 
 
-def test_a_sequence_is_true_once_it_is_complete(tmp_path: Path) -> None:
-    """Of the truths of each step it follows when a sequence is true."""
+def test_a_sequence_is_true_when_it_is_complete(tmp_path: Path) -> None:
+    """The truths of both parts at each step determine when a sequence is true."""
     record(tmp_path, meeting(45, 20), DOCK)
     lake = Lake.create(tmp_path / "lake")
     key, _ = add_run(lake, tmp_path)
     first, then = "converging(arm, spartan)", "diverging(arm, spartan)"
     truths: list[tuple[float, bool, bool, bool]] = []
-    judges = [
+    evaluators = [
         PatternEvaluator(read_pattern(t))
         for t in (first, then, f"{first} and then {then} within 1 s")
     ]
 
-    def look(step: Step) -> None:
-        for judge in judges:
-            judge(step)
-        held = [any(r.truth == "true" for r in j.before.readings) for j in judges if j.before]
-        truths.append((step.time, held[0], held[1], held[2]))
+    def record_truths(step: Step) -> None:
+        for evaluator in evaluators:
+            evaluator(step)
+        truth = [any(r.truth == "true" for r in j.before.readings) for j in evaluators if j.before]
+        truths.append((step.time, truth[0], truth[1], truth[2]))
 
     recording, settings = lake.recorded(key)
-    replay(recording, settings, on_step=look)
+    replay(recording, settings, on_step=record_truths)
     assert any(t[3] for t in truths)
     for n, (time, _, second, both) in enumerate(truths):
         # A sample speaks until the next one.
         ends = [t for t, *_ in truths[1 : n + 1]]
-        spoke = any(t[1] and end > time - 1.0 for t, end in zip(truths, ends, strict=False))
-        assert both == (second and spoke), time
+        preceded = any(t[1] and end > time - 1.0 for t, end in zip(truths, ends, strict=False))
+        assert both == (second and preceded), time
 
 
-def test_a_task_is_found_where_a_replay_carries_it_out(
+def test_a_task_is_found_where_a_replay_succeeds(
     lake: Lake, database: LakeDatabase, tmp_path: Path
 ) -> None:
     file = tmp_path / "near.task"
     file.write_text("<near> ::= converging(arm, satellite)\n")
     search = read_search(str(file))
-    found = {f.run: f.hits for f in find(lake, search, search.possible_runs(database))}
+    hits_by_run = {f.run: f.hits for f in find(lake, search, search.possible_runs(database))}
     ends = []
     for run in lake.runs():
         recording, settings = lake.recorded(run)
-        told = replay(recording, changed_settings(settings, tasks=(str(file),)))
-        ends.append(told.verdict)
-        assert bool(found[run]) == (told.verdict == "succeeded")
-        for hit in found[run]:
+        transcript = replay(recording, changed_settings(settings, tasks=(str(file),)))
+        ends.append(transcript.verdict)
+        assert bool(hits_by_run[run]) == (transcript.verdict == "succeeded")
+        for hit in hits_by_run[run]:
             assert (hit.rule, hit.names) == ("near", ("arm", "spartan"))
             assert 0 <= hit.begin <= hit.end
     assert "succeeded" in ends
@@ -289,7 +289,7 @@ def test_a_task_is_found_where_a_replay_carries_it_out(
         read_search(str(tmp_path / "none.task"))
 
 
-def test_what_is_looked_for_can_be_sent_to_other_processes() -> None:
+def test_a_search_can_be_sent_to_other_processes() -> None:
     search = read_search("converging(arm, satellite) and then touching(arm, 2) within 1 s")
     assert ForkingPickler.loads(ForkingPickler.dumps(search)) == search
     assert list(each_run(abs, [-3, 1, -2], workers=2)) == [3, 1, 2]
@@ -299,14 +299,14 @@ times = st.floats(0, 60, allow_nan=False)
 
 
 @given(st.lists(st.tuples(times, times), max_size=8))
-def test_what_is_cut_out_covers_all_hits_once(of: list[tuple[float, float]]) -> None:
-    hits = tuple(Hit((), (), "true", min(p), max(p), False) for p in of)
-    found = spans(hits)
-    assert all(any(b <= h.begin and h.end <= e for b, e in found) for h in hits)
-    assert all(one[1] < other[0] for one, other in pairwise(found))
+def test_clip_spans_cover_each_hit_once(intervals: list[tuple[float, float]]) -> None:
+    hits = tuple(Hit((), (), "true", min(p), max(p), False) for p in intervals)
+    clip_spans = spans(hits)
+    assert all(any(b <= h.begin and h.end <= e for b, e in clip_spans) for h in hits)
+    assert all(span[1] < next_span[0] for span, next_span in pairwise(clip_spans))
 
 
-def test_hits_are_cut_out_of_the_footage(tmp_path: Path) -> None:
+def test_hits_are_cut_out_of_the_video(tmp_path: Path) -> None:
     clip = write_clip(tmp_path / "disc.avi", moving_disc(50), fps=5.0)
     hits = (Hit((), (), "true", 3.0, 3.5, False), Hit((), (), "true", 8.0, 8.2, False))
     videos = cut_hits(str(clip), "ab" * 16, hits, tmp_path / "cut")
@@ -317,19 +317,19 @@ def test_hits_are_cut_out_of_the_footage(tmp_path: Path) -> None:
         cut_hits(str(tmp_path / "gone.mp4"), "ab" * 16, hits, tmp_path / "cut")
 
 
-def test_the_command(
+def test_the_command_prints_hits_and_counts(
     lake: Lake, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     visup: Call = caller(monkeypatch, capfd)
-    told = visup("find", lake.path, "converging(arm, satellite) for 0.3 s")
-    assert told.code == 0, told.err
-    assert "arm (1), spartan (2), confidence" in told.out
-    assert "inspect it: visup step " in told.out
+    result = visup("find", lake.path, "converging(arm, satellite) for 0.3 s")
+    assert result.code == 0, result.err
+    assert "arm (1), spartan (2), confidence" in result.out
+    assert "inspect it: visup step " in result.out
     lines = visup(
         "find", lake.path, "converging(arm, satellite) for 0.3 s", "--json"
     ).out.splitlines()
     hits = [json.loads(line) for line in lines]
-    assert f"Hits: {len(hits)}, in " in told.out
+    assert f"Hits: {len(hits)}, in " in result.out
     assert {tuple(h["names"]) for h in hits} == {("arm", "spartan")}
     assert all(Path(h["folder"], "journal.sqlite").is_file() for h in hits)
     first = visup("find", lake.path, "converging(a, b)", "--first", 1, "--clips", lake.path / "cut")

@@ -1,4 +1,4 @@
-"""Runs whose files are joined are the same runs: rows, answers, hits; whatever happens meanwhile."""
+"""Compacting a lake changes none of its rows, answers and hits, even if it is interrupted."""
 
 from __future__ import annotations
 
@@ -46,18 +46,22 @@ SEARCHES = (
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Recording, RunTables]:
     recording = recorded(tmp_path_factory.mktemp("run"), DOCK)
-    told = recorded_settings(recording.facts(), "")
-    return recording, run_tables(recording, told, Provenance("", "s", "t", 1e9, {"gripper": "new"}))
+    run_settings = recorded_settings(recording.facts(), "")
+    return recording, run_tables(
+        recording, run_settings, Provenance("", "s", "t", 1e9, {"gripper": "new"})
+    )
 
 
 def add(lake: Lake, run: tuple[Recording, RunTables], *keys: str) -> Lake:
     """Commit runs that differ in their key alone; the last one has no relations."""
     recording, tables = run
     for key in keys:
-        own: dict[str, Any] = {t: [(key, *row[1:]) for row in rows] for t, rows in tables.items()}
+        rows_by_table: dict[str, Any] = {
+            t: [(key, *row[1:]) for row in rows] for t, rows in tables.items()
+        }
         if key == KEYS[-1]:
-            own["relations"] = own["alerts"] = []
-        lake.commit(own, recording, run_inputs(DOCK))
+            rows_by_table["relations"] = rows_by_table["alerts"] = []
+        lake.commit(rows_by_table, recording, run_inputs(DOCK))
     return lake
 
 
@@ -65,32 +69,32 @@ def add(lake: Lake, run: tuple[Recording, RunTables], *keys: str) -> Lake:
 def loose(
     tmp_path_factory: pytest.TempPathFactory, run: tuple[Recording, RunTables]
 ) -> tuple[dict[str, Any], Lake]:
-    """A lake whose runs are not joined, and what it tells."""
+    """The contents of a lake that is not compacted, and the lake."""
     lake = add(Lake.create(tmp_path_factory.mktemp("loose") / "lake"), run, *KEYS)
-    return told(lake), lake
+    return contents(lake), lake
 
 
-def told(lake: Lake) -> dict[str, Any]:
-    """All that a lake tells: its rows, what every view answers, and where conditions may be."""
-    found: dict[str, Any] = {name: list(lake.rows(name)) for name in TABLES}
+def contents(lake: Lake) -> dict[str, Any]:
+    """The contents of a lake: its rows, those of every view, and the runs in which conditions may hold."""
+    everything: dict[str, Any] = {name: list(lake.rows(name)) for name in TABLES}
     with open_database(lake) as database:
         for view in (*VIEWS, *RELATIONS[:3], *(f"lake.{name}" for name in TABLES)):
             rows = database.ask(f"SELECT * FROM {view}").to_pylist()
-            found[f"view {view}"] = sorted(json.dumps(r, default=str) for r in rows)
+            everything[f"view {view}"] = sorted(json.dumps(r, default=str) for r in rows)
         for text in SEARCHES:
-            found[text] = read_search(text).possible_runs(database)
-    return {**found, "keys": lake.runs(), "has": [lake.has(key) for key in KEYS]}
+            everything[text] = read_search(text).possible_runs(database)
+    return {**everything, "keys": lake.runs(), "has": [lake.has(key) for key in KEYS]}
 
 
-def test_a_joined_lake_tells_the_same(
+def test_a_compacted_lake_has_the_same_contents(
     tmp_path: Path, run: tuple[Recording, RunTables], loose: tuple[dict[str, Any], Lake]
 ) -> None:
     lake = add(Lake.create(tmp_path / "lake"), run, *KEYS[:3])
     assert compact(lake, now=1e9).joined == 3
     add(lake, run, *KEYS[2:])  # one again, which is there
-    half = told(lake)
+    half = contents(lake)
     assert compact(lake, now=1e9 + 1, grace_s=0.0).tidied == 5
-    assert half == told(lake) == loose[0]
+    assert half == contents(lake) == loose[0]
     assert not [f for name in TABLES for f in lake.files(name) if f.stem in KEYS]
     assert len(list((lake.path / FOLDER).iterdir())) == 1  # the first was small, and went into it
     assert compact(lake).joined == 0
@@ -98,27 +102,27 @@ def test_a_joined_lake_tells_the_same(
 
 @settings(max_examples=3, deadline=None)
 @given(st.permutations(KEYS[:4]), st.integers(1, 3), st.integers(1, 3))
-def test_the_same_runs_make_the_same_partitions(
+def test_partitions_contain_each_run_once_in_any_order(
     tmp_path_factory: pytest.TempPathFactory,
     run: tuple[Recording, RunTables],
     keys: list[str],
     first: int,
-    most: int,
+    max_runs: int,
 ) -> None:
     """Whatever the order in which they came; and no partition is larger than it may be."""
     lake = Lake.create(tmp_path_factory.mktemp("order") / "lake")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(compacting, "MOST_RUNS", most)
+        patch.setattr(compacting, "MOST_RUNS", max_runs)
         for part in (keys[:first], keys[first:]):
             compact(add(lake, run, *part))
         parts = read_manifest(lake.path).partitions
     assert sorted(key for part in parts for key in part.runs) == sorted(keys)
-    assert all(len(part.runs) <= most for part in parts)
+    assert all(len(part.runs) <= max_runs for part in parts)
     assert len({part.number for part in parts}) == len(parts)
     assert [r["run"] for r in lake.rows("runs")] == sorted(keys)
 
 
-def test_joining_may_stop_anywhere(
+def test_compacting_may_stop_anywhere(
     tmp_path: Path,
     run: tuple[Recording, RunTables],
     loose: tuple[dict[str, Any], Lake],
@@ -146,32 +150,32 @@ def test_joining_may_stop_anywhere(
         assert not (lake.path / MANIFEST).exists()
     allowed = 100
     assert compact(lake, grace_s=0.0).joined == len(KEYS)
-    assert told(lake) == loose[0]
+    assert contents(lake) == loose[0]
 
 
-def test_a_reader_that_began_before_is_not_disturbed(
+def test_a_reader_is_not_disturbed_by_compacting(
     tmp_path: Path, run: tuple[Recording, RunTables]
 ) -> None:
     lake = add(Lake.create(tmp_path / "lake"), run, *KEYS[:3])
-    question = "SELECT count(*) AS n, count(DISTINCT run) AS runs FROM relations"
+    query = "SELECT count(*) AS n, count(DISTINCT run) AS runs FROM relations"
     with open_database(lake) as database:
-        before = database.ask(question).to_pylist()
+        before = database.ask(query).to_pylist()
         compact(lake)
         add(lake, run, KEYS[3])
-        assert database.ask(question).to_pylist() == before
+        assert database.ask(query).to_pylist() == before
     with open_database(lake) as database:
-        assert database.ask(question).to_pylist()[0]["runs"] == 4
+        assert database.ask(query).to_pylist()[0]["runs"] == 4
 
 
 @pytest.mark.parametrize("text", ["{", '{"version": 9}', '{"version": 1}'])
-def test_a_damaged_list_of_partitions_is_refused(tmp_path: Path, text: str) -> None:
+def test_a_damaged_manifest_is_refused(tmp_path: Path, text: str) -> None:
     lake = Lake.create(tmp_path / "lake")
     (lake.path / MANIFEST).write_text(text)
     with pytest.raises(OutputError, match="list of partitions"):
         lake.runs()
 
 
-def test_the_command(
+def test_the_command_reports_merged_runs(
     loose: tuple[dict[str, Any], Lake],
     monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],

@@ -1,4 +1,4 @@
-"""Lakes: the rows of a run are those of its journal, and a run is there whole or not at all."""
+"""Lakes: the rows of a run are those of its journal, and a run is committed whole or not at all."""
 
 from __future__ import annotations
 
@@ -46,8 +46,8 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Recording:
 
 def tables_of(recording: Recording) -> RunTables:
     settings = recorded_settings(recording.facts(), "")
-    given = Provenance(KEY, "s", "t", 1e9, {"gripper": "new"})
-    return run_tables(recording, settings, given)
+    provenance = Provenance(KEY, "s", "t", 1e9, {"gripper": "new"})
+    return run_tables(recording, settings, provenance)
 
 
 @pytest.fixture(scope="module")
@@ -59,30 +59,30 @@ def as_records(tables: RunTables, name: str) -> list[dict[str, object]]:
     return [dict(zip(TABLES[name].names, row, strict=True)) for row in tables[name]]
 
 
-def test_the_rows_are_always_the_same(run: Recording, tables: RunTables) -> None:
+def test_the_rows_of_a_run_are_deterministic(run: Recording, tables: RunTables) -> None:
     assert tables_of(run) == tables
     assert list(tables) == list(TABLES)
     assert all(len(row) == len(TABLES[name].columns) for name in TABLES for row in tables[name])
     assert {row[0] for rows in tables.values() for row in rows} == {KEY}
 
 
-def test_rows_are_what_was_believed_at_each_step(tmp_path: Path) -> None:
+def test_rows_are_the_beliefs_of_each_step(tmp_path: Path) -> None:
     steps = record(tmp_path, meeting(), DOCK)
     tables = tables_of(Recording.open(tmp_path))
     stages, relations = as_records(tables, "stages"), as_records(tables, "relations")
     for number, step in enumerate(steps):
 
-        def now(rows: list[dict[str, object]], at: int = number) -> list[dict[str, object]]:
-            return [r for r in rows if r["first_frame"] <= at < r["first_frame"] + r["steps"]]  # type: ignore[operator]
+        def now(rows: list[dict[str, object]], frame: int = number) -> list[dict[str, object]]:
+            return [r for r in rows if r["first_frame"] <= frame < r["first_frame"] + r["steps"]]  # type: ignore[operator]
 
-        told = {(r["task"], r["stage"]): r["status"] for r in now(stages)}
-        assert told == {(t.task, s.stage): s.status for t in step.mind.tasks for s in t.stages}
-        held = {
+        statuses = {(r["task"], r["stage"]): r["status"] for r in now(stages)}
+        assert statuses == {(t.task, s.stage): s.status for t in step.mind.tasks for s in t.stages}
+        converging = {
             (r["a"], r["b"])
             for r in now(relations)
             if r["relation"] == "converging" and r["truth"] == "true"
         }
-        assert held == {
+        assert converging == {
             r.objects for r in step.mind.relations if r.name == "converging" and r.truth == "true"
         }
     assert {r["relation"] for r in relations} >= {"converging", "touching", "diverging"}
@@ -98,16 +98,16 @@ def test_written_tables_are_read_back(run: Recording, tables: RunTables, tmp_pat
     assert lake.commit(tables, run, run_inputs(DOCK))
     assert not lake.commit(tables, run, run_inputs(DOCK))
     for name in TABLES:
-        read, wanted = list(lake.rows(name)), as_records(tables, name)
+        read, expected = list(lake.rows(name)), as_records(tables, name)
         for row in read:
             if name == "runs":
                 row["taken"] = row["taken"].timestamp()  # type: ignore[index]
-        assert read == wanted, name
+        assert read == expected, name
     schemas = {name: {str(parquet.read_schema(f)) for f in lake.files(name)} for name in TABLES}
-    assert {name for name, found in schemas.items() if len(found) != 1} == set()
+    assert {name for name, files in schemas.items() if len(files) != 1} == set()
 
 
-def test_a_kept_run_is_reasoned_about_again_without_its_files(tmp_path: Path) -> None:
+def test_a_stored_run_can_be_replayed_without_its_files(tmp_path: Path) -> None:
     folder = tmp_path / "tasks"
     folder.mkdir()
     (folder / "part.task").write_text("zone bay is (0, 0) (9, 0) (9, 9)\n")
@@ -128,15 +128,15 @@ def test_a_kept_run_is_reasoned_about_again_without_its_files(tmp_path: Path) ->
     assert add_run(lake, tmp_path / "run") == (key, False)
     for file in folder.iterdir():
         file.unlink()
-    recording, kept = lake.recorded(key)
-    assert list(replay(recording, kept).events) == list(recording.events())
+    recording, stored_settings = lake.recorded(key)
+    assert list(replay(recording, stored_settings).events) == list(recording.events())
 
 
 def files_in(lake: Lake) -> set[str]:
     return {str(p.relative_to(lake.path)) for p in lake.path.rglob("*") if p.is_file()}
 
 
-def test_a_writer_may_stop_anywhere(
+def test_a_commit_may_fail_anywhere(
     run: Recording, tables: RunTables, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     whole, lake = Lake.create(tmp_path / "whole"), Lake.create(tmp_path / "lake")
@@ -170,9 +170,9 @@ def test_a_writer_may_stop_anywhere(
         assert list(lake.rows(name)) == list(whole.rows(name))
 
 
-def test_settings_are_told_apart_by_content(tmp_path: Path) -> None:
-    one, two = tmp_path / "one", tmp_path / "two"
-    for folder in (one, two):
+def test_hashes_depend_on_the_content_of_files(tmp_path: Path) -> None:
+    first, second = tmp_path / "one", tmp_path / "two"
+    for folder in (first, second):
         folder.mkdir()
         (folder / "a.task").write_text("<a> ::= converging(arm, satellite)\n")
         (folder / "db").write_bytes(b"models")
@@ -181,19 +181,19 @@ def test_settings_are_told_apart_by_content(tmp_path: Path) -> None:
         task = str(folder / "a.task")
         return settings_hash(WatchSettings("x", tasks=(task,), models=folder / "db", **more))  # type: ignore[arg-type]
 
-    assert hashed(one) == hashed(two) != hashed(one, every=2)
-    (two / "a.task").write_text("<a> ::= diverging(arm, satellite)\n")
-    assert hashed(one) != hashed(two)
-    (two / "a.task").write_text("<a> ::= converging(arm, satellite)\n")
-    (two / "db").write_bytes(b"others")
-    assert hashed(one) != hashed(two)
-    assert content_hash(one) != content_hash(two)
-    (two / "db").write_bytes(b"models")
-    assert content_hash(one) == content_hash(two)
+    assert hashed(first) == hashed(second) != hashed(first, every=2)
+    (second / "a.task").write_text("<a> ::= diverging(arm, satellite)\n")
+    assert hashed(first) != hashed(second)
+    (second / "a.task").write_text("<a> ::= converging(arm, satellite)\n")
+    (second / "db").write_bytes(b"others")
+    assert hashed(first) != hashed(second)
+    assert content_hash(first) != content_hash(second)
+    (second / "db").write_bytes(b"models")
+    assert content_hash(first) == content_hash(second)
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         (None, "there is no lake here"),
         ("[]", "this is not a lake"),
@@ -201,26 +201,30 @@ def test_settings_are_told_apart_by_content(tmp_path: Path) -> None:
         ("{", "this is not a lake"),
     ],
 )
-def test_what_is_no_lake_is_refused(tmp_path: Path, text: str | None, said: str) -> None:
+def test_a_folder_that_is_no_lake_is_refused(
+    tmp_path: Path, text: str | None, message: str
+) -> None:
     if text is not None:
         (tmp_path / "lake.json").write_text(text)
-    with pytest.raises(OutputError, match=said):
+    with pytest.raises(OutputError, match=message):
         Lake.open(tmp_path)
 
 
-def test_a_folder_with_something_else_is_left_alone(tmp_path: Path) -> None:
+def test_a_folder_with_other_files_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "thesis.txt").write_text("mine")
     with pytest.raises(OutputError, match="no lake"):
         Lake.create(tmp_path)
     assert [p.name for p in tmp_path.iterdir()] == ["thesis.txt"]
 
 
-def test_the_command_adds_what_it_can(visup: Call, tmp_path: Path) -> None:
+def test_the_command_adds_the_runs_it_can(visup: Call, tmp_path: Path) -> None:
     record(tmp_path / "good", meeting())
     record(tmp_path / "cut", meeting(5), ended=None)
-    told = visup("archive", "add", tmp_path / "cut", tmp_path / "good", "--into", tmp_path / "lake")
-    assert told.code == 1
-    assert "the run has not ended" in told.err
+    result = visup(
+        "archive", "add", tmp_path / "cut", tmp_path / "good", "--into", tmp_path / "lake"
+    )
+    assert result.code == 1
+    assert "the run has not ended" in result.err
     assert len(Lake.open(tmp_path / "lake").runs()) == 1
     assert (
         "was already there"
@@ -228,7 +232,7 @@ def test_the_command_adds_what_it_can(visup: Call, tmp_path: Path) -> None:
     )
 
 
-def test_the_page_says_what_the_tables_hold() -> None:
+def test_the_documentation_has_the_schema_of_the_tables() -> None:
     page = (ROOT / "docs" / "archives.md").read_text(encoding="utf-8")
     assert schema_text() in page
     assert json.dumps({"format": "visup lake", "version": 1}) in page

@@ -1,4 +1,4 @@
-"""Other rules on the past: what changes is what replays of the runs themselves say."""
+"""Other rules on recorded runs: the changes reported are those of replays of each run."""
 
 from __future__ import annotations
 
@@ -25,62 +25,62 @@ NEAR = (
 
 
 @pytest.fixture(scope="module")
-def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two runs, by themselves and in a lake, and other rules."""
-    place = tmp_path_factory.mktemp("replaying")
-    lake = Lake.create(place / "lake")
+    folder = tmp_path_factory.mktemp("replaying")
+    lake = Lake.create(folder / "lake")
     for number, count in enumerate((40, 12)):
-        record(place / f"run-{number}", meeting(count, 20), DOCK)
-        add_run(lake, place / f"run-{number}")
-    (place / "near.rules").write_text(NEAR)
-    return place
+        record(folder / f"run-{number}", meeting(count, 20), DOCK)
+        add_run(lake, folder / f"run-{number}")
+    (folder / "near.rules").write_text(NEAR)
+    return folder
 
 
-def test_nothing_changes_with_what_there_was(place: Path) -> None:
-    lake, summary = Lake.open(place / "lake"), ChangeSummary()
-    for found in changes(lake, lake.runs()):
-        summary.take(found)
-        assert not found.diff
+def test_the_recorded_settings_change_nothing(folder: Path) -> None:
+    lake, summary = Lake.open(folder / "lake"), ChangeSummary()
+    for change in changes(lake, lake.runs()):
+        summary.take(change)
+        assert not change.diff
     assert (summary.runs, summary.changed) == (2, 0)
 
 
-def test_what_changes_is_what_replays_say(place: Path) -> None:
-    lake, summary = Lake.open(place / "lake"), ChangeSummary()
-    rules = (place / "near.rules",)
-    for found in changes(lake, lake.runs(), rules=rules):
-        summary.take(found)
-    wanted: Counter[str] = Counter()
+def test_changes_are_those_of_replays(folder: Path) -> None:
+    lake, summary = Lake.open(folder / "lake"), ChangeSummary()
+    rules = (folder / "near.rules",)
+    for change in changes(lake, lake.runs(), rules=rules):
+        summary.take(change)
+    expected: Counter[str] = Counter()
     for number in (0, 1):
-        recording = Recording.open(place / f"run-{number}")
-        told = replay(recording, settings_for(recording, rules=rules))
-        diff = transcript_diff(recorded_transcript(recording), told)
+        recording = Recording.open(folder / f"run-{number}")
+        transcript = replay(recording, settings_for(recording, rules=rules))
+        diff = transcript_diff(recorded_transcript(recording), transcript)
         gone, new = (
             Counter(
                 (e["data"]["alert_kind"], e["time"], e["text"]) for e in es if e["kind"] == "alert"
             )
             for es in (diff.gone, diff.new)
         )
-        wanted.update(kind for kind, *_ in (new - gone).elements())
-    assert summary.gained == wanted
-    assert wanted["near"] >= 1
-    assert f"  alerts near: 0 lost, {wanted['near']} gained" in list(summary.lines())
+        expected.update(kind for kind, *_ in (new - gone).elements())
+    assert summary.gained == expected
+    assert expected["near"] >= 1
+    assert f"  alerts near: 0 lost, {expected['near']} gained" in list(summary.lines())
 
 
-def test_a_task_changes_verdicts(place: Path) -> None:
-    lake, summary = Lake.open(place / "lake"), ChangeSummary()
-    for found in changes(lake, lake.runs(), tasks=("undock",)):
-        summary.take(found)
+def test_a_task_changes_verdicts(folder: Path) -> None:
+    lake, summary = Lake.open(folder / "lake"), ChangeSummary()
+    for change in changes(lake, lake.runs(), tasks=("undock",)):
+        summary.take(change)
     assert summary.changed == 2
 
 
-def test_the_command(
-    place: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+def test_the_command_prints_changes(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     visup: Call = caller(monkeypatch, capfd)
-    same = visup("archive", "replay", place / "lake")
+    same = visup("archive", "replay", folder / "lake")
     assert (same.code, same.out) == (0, "Runs: 2, of which 0 change.\n")
-    told = visup("archive", "replay", place / "lake", "--rules", place / "near.rules")
-    assert told.code == 1
-    assert "clip.mp4: " in told.out
-    assert "alerts near: 0 lost, " in told.out
-    assert visup("archive", "replay", place / "lake", "--rules", place / "none.rules").code == 2
+    result = visup("archive", "replay", folder / "lake", "--rules", folder / "near.rules")
+    assert result.code == 1
+    assert "clip.mp4: " in result.out
+    assert "alerts near: 0 lost, " in result.out
+    assert visup("archive", "replay", folder / "lake", "--rules", folder / "none.rules").code == 2

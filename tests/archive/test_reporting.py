@@ -1,4 +1,4 @@
-"""The page about all runs: durations are those of the tables, drifts are not made of chance."""
+"""The page about all runs: durations are those of the tables, drifts are not due to chance."""
 
 from __future__ import annotations
 
@@ -27,38 +27,38 @@ pytest.importorskip("plotly", reason="needs the extra `report`")
 arrow = pytest.importorskip("pyarrow", reason="needs the extra `cluster`")
 
 DOCK = WatchSettings("clip.mp4", tasks=("dock",), actors={"satellite": ("spartan",)})
-UNDER_WAY = ("active", "progressing", "paused", "stalled")
+ACTIVE_STATUSES = ("active", "progressing", "paused", "stalled")
 
 
 @pytest.fixture(scope="module")
 def lake(tmp_path_factory: pytest.TempPathFactory) -> Lake:
     """Runs of which some fail."""
-    place = tmp_path_factory.mktemp("report")
-    made = Lake.create(place / "lake <b>")
+    folder = tmp_path_factory.mktemp("report")
+    lake = Lake.create(folder / "lake <b>")
     for number, count in enumerate((45, 25, 14)):
-        record(place / f"run-{number}", meeting(count, 20), DOCK)
-        add_run(made, place / f"run-{number}", {"gripper": "<new>" if number else "old"})
-    return made
+        record(folder / f"run-{number}", meeting(count, 20), DOCK)
+        add_run(lake, folder / f"run-{number}", {"gripper": "<new>" if number else "old"})
+    return lake
 
 
 @pytest.fixture(scope="module")
-def found(lake: Lake) -> Iterator[LakeStatistics]:
+def statistics(lake: Lake) -> Iterator[LakeStatistics]:
     with open_database(lake) as database:
         yield lake_statistics(database)
 
 
-def test_durations_are_those_of_the_tables(lake: Lake, found: LakeStatistics) -> None:
-    took: dict[tuple[str, str], dict[str, float]] = defaultdict(lambda: defaultdict(float))
+def test_durations_are_those_of_the_tables(lake: Lake, statistics: LakeStatistics) -> None:
+    durations: dict[tuple[str, str], dict[str, float]] = defaultdict(lambda: defaultdict(float))
     for row in lake.rows("stages"):
-        if row["status"] in UNDER_WAY:
-            took[row["task"], row["stage"]][row["run"]] += row["end"] - row["begin"]
-    assert {(d.task, d.stage): d.runs for d in found.durations} == {
-        s: len(of) for s, of in took.items()
+        if row["status"] in ACTIVE_STATUSES:
+            durations[row["task"], row["stage"]][row["run"]] += row["end"] - row["begin"]
+    assert {(d.task, d.stage): d.runs for d in statistics.durations} == {
+        s: len(of) for s, of in durations.items()
     }
-    medians = [median(took[d.task, d.stage].values()) for d in found.durations]
-    assert [d.mid for d in found.durations] == pytest.approx(medians)
-    for stage in found.durations:
-        parts = [d for d in found.by_actor if (d.task, d.stage) == (stage.task, stage.stage)]
+    medians = [median(durations[d.task, d.stage].values()) for d in statistics.durations]
+    assert [d.mid for d in statistics.durations] == pytest.approx(medians)
+    for stage in statistics.durations:
+        parts = [d for d in statistics.by_actor if (d.task, d.stage) == (stage.task, stage.stage)]
         of_label = [d for d in parts if d.group.startswith("gripper = ")]
         assert sum(d.runs for d in of_label) == stage.runs
         (played,) = [d for d in parts if d.group == "satellite = spartan"]
@@ -66,14 +66,14 @@ def test_durations_are_those_of_the_tables(lake: Lake, found: LakeStatistics) ->
         assert played.low <= played.mid <= played.high <= played.longest
 
 
-def test_failures_are_ranked_and_none_is_left_out(lake: Lake, found: LakeStatistics) -> None:
+def test_failures_are_complete_and_ranked(lake: Lake, statistics: LakeStatistics) -> None:
     failed = [r for r in lake.rows("runs") if r["verdict"] in ("failed", "interrupted")]
-    assert sum(f.runs for f in found.failures) == len(failed) > 0
-    assert sum(f.share for f in found.failures) == pytest.approx(1.0)
-    assert [f.runs for f in found.failures] == sorted(
-        (f.runs for f in found.failures), reverse=True
+    assert sum(f.runs for f in statistics.failures) == len(failed) > 0
+    assert sum(f.share for f in statistics.failures) == pytest.approx(1.0)
+    assert [f.runs for f in statistics.failures] == sorted(
+        (f.runs for f in statistics.failures), reverse=True
     )
-    assert {f.run for f in found.failures} <= {r["run"] for r in failed}
+    assert {f.run for f in statistics.failures} <= {r["run"] for r in failed}
 
 
 class _Answers:
@@ -94,7 +94,7 @@ def drifting(took: np.ndarray) -> list[float]:
     return [d.change for d in drifts(database)]
 
 
-def test_drifts_are_told_and_chance_is_not() -> None:
+def test_drifts_are_reported_and_noise_is_not() -> None:
     rng = np.random.default_rng(3)
     false = sum(bool(drifting(rng.lognormal(2.0, 0.5, 60))) for _ in range(100))
     assert false <= 4  # one in a hundred is expected
@@ -106,19 +106,19 @@ def test_drifts_are_told_and_chance_is_not() -> None:
     assert faster == pytest.approx(1 / (1 + slower) - 1)
 
 
-def test_the_page_is_whole_and_escapes_what_it_shows(lake: Lake, found: LakeStatistics) -> None:
-    page = lake_page(found, lake.path)
-    assert page == lake_page(found, lake.path)
+def test_the_page_is_complete_and_escaped(lake: Lake, statistics: LakeStatistics) -> None:
+    page = lake_page(statistics, lake.path)
+    assert page == lake_page(statistics, lake.path)
     assert "lake &lt;b&gt;" in page
     assert "gripper = &lt;new&gt;" in page
     assert "<b>" not in page
     (text,) = re.findall(r'id="figures">(.*?)</script>', page)
     ids = [figure["id"] for figure in json.loads(text)]
-    assert ids == [figure.key for figure in all_figures(found)]
+    assert ids == [figure.key for figure in all_figures(statistics)]
     assert all(f'id="{key}"' in page for key in ids)
 
 
-def test_the_command(
+def test_the_command_writes_the_page(
     lake: Lake, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     visup: Call = caller(monkeypatch, capfd)
@@ -126,7 +126,7 @@ def test_the_command(
     assert visup("archive", "report", lake.path, "--out", out).code == 0
     assert "<h2>How runs fail</h2>" in out.read_text()
     empty = Lake.create(tmp_path / "empty").path
-    told = visup("archive", "report", empty)
-    assert (told.code, told.out) == (0, f"{empty}/report.html: 0 runs\n")
+    result = visup("archive", "report", empty)
+    assert (result.code, result.out) == (0, f"{empty}/report.html: 0 runs\n")
     assert "No run failed." in (empty / "report.html").read_text()
     assert visup("archive", "report", tmp_path / "none").code == 2

@@ -1,4 +1,4 @@
-"""Clips in stores: found, told apart by what the store says, copied to be watched, named as they were."""
+"""Clips in stores: found, identified by their metadata, copied to be watched, recorded by their URL."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ parquet = pytest.importorskip("pyarrow.parquet", reason="needs the extra `cluste
 @pytest.fixture
 def memory() -> str:
     """A store in memory with three clips."""
-    place = f"memory://{uuid4().hex}"
-    return filled(place)
+    url = f"memory://{uuid4().hex}"
+    return write_clips(url)
 
 
 @pytest.fixture(scope="module")
@@ -46,76 +46,76 @@ def bucket() -> Iterator[str]:
         for name, value in {**keys, "AWS_ENDPOINT_URL": f"http://{host}:{port}"}.items():
             patch.setenv(name, value)
         fsspec.filesystem("s3").mkdir("clips")
-        yield filled("s3://clips")
+        yield write_clips("s3://clips")
     running.stop()
 
 
-def filled(place: str) -> str:
+def write_clips(url: str) -> str:
     for name in ("a.mp4", "b.avi", "deep/c.mp4", "deep/notes.txt"):
-        with fsspec.open(f"{place}/{name}", "wb") as file:
+        with fsspec.open(f"{url}/{name}", "wb") as file:
             file.write(b"1" if name == "a.mp4" else b"22")
-    return place
+    return url
 
 
-def watched(settings: WatchSettings, folder: Path) -> None:
+def watch(settings: WatchSettings, folder: Path) -> None:
     """A meeting whose place follows from the clip's content."""
     assert not is_url(settings.source)
     record(folder, meeting(12, shift=float(Path(settings.source).read_text())), settings)
 
 
-def run(lake: Lake, found: list[Clip]) -> tuple[Plan, FillResult]:
-    plan = make_plan(lake, found, WatchSettings(""))
-    return plan, fill(lake, plan, Pool(), lambda outcome: None, watched)
+def run(lake: Lake, clip_list: list[Clip]) -> tuple[Plan, FillResult]:
+    plan = make_plan(lake, clip_list, WatchSettings(""))
+    return plan, fill(lake, plan, Pool(), lambda outcome: None, watch)
 
 
-def names(place: str, *words: str) -> list[str]:
-    found = clips_of([f"{place}/{word}" if word else place for word in words])
-    return [str(c.source).split(place.partition("://")[2])[-1].strip("/") for c in found]
+def names(url: str, *paths: str) -> list[str]:
+    clip_list = clips_of([f"{url}/{path}" if path else url for path in paths])
+    return [str(c.source).split(url.partition("://")[2])[-1].strip("/") for c in clip_list]
 
 
-def check_store(place: str, lake: Lake) -> None:
-    """What is asked of any store."""
-    assert names(place, "") == ["a.mp4", "b.avi", "deep/c.mp4"]
-    found = names(place, "a.mp4", "*.avi", "**/*.mp4", "deep")
-    assert sorted(found) == ["a.mp4", "b.avi", "deep/c.mp4"]
-    plan, result = run(lake, clips_of([place]))
+def check_store(url: str, lake: Lake) -> None:
+    """Check what any store must do."""
+    assert names(url, "") == ["a.mp4", "b.avi", "deep/c.mp4"]
+    paths = names(url, "a.mp4", "*.avi", "**/*.mp4", "deep")
+    assert sorted(paths) == ["a.mp4", "b.avi", "deep/c.mp4"]
+    plan, result = run(lake, clips_of([url]))
     assert (len(plan.jobs), result.failed) == (3, [])
     assert plan.bytes == 5
-    told = {row["source"] for row in lake.rows("runs")}
-    assert told == {str(c.source) for c in clips_of([place])}
-    assert all(lake.recorded(key)[1].source in told for key in lake.runs())
+    sources = {row["source"] for row in lake.rows("runs")}
+    assert sources == {str(c.source) for c in clips_of([url])}
+    assert all(lake.recorded(key)[1].source in sources for key in lake.runs())
     assert list((lake.path / "work").iterdir()) == []
-    with fsspec.open(f"{place}/a.mp4", "wb") as file:
+    with fsspec.open(f"{url}/a.mp4", "wb") as file:
         file.write(b"333")
-    plan, _ = run(lake, clips_of([place]))
+    plan, _ = run(lake, clips_of([url]))
     assert (len(plan.jobs), plan.present) == (1, 2)
 
 
-def test_clips_in_memory(memory: str, tmp_path: Path) -> None:
+def test_clips_can_be_stored_in_memory(memory: str, tmp_path: Path) -> None:
     check_store(memory, Lake.create(tmp_path / "lake"))
 
 
-def test_clips_in_an_object_store(bucket: str, tmp_path: Path) -> None:
+def test_clips_can_be_stored_in_a_bucket(bucket: str, tmp_path: Path) -> None:
     check_store(bucket, Lake.create(tmp_path / "lake"))
 
 
-def test_a_clip_that_is_gone_is_told_and_the_others_are_done(memory: str, tmp_path: Path) -> None:
-    lake, found = Lake.create(tmp_path / "lake"), clips_of([memory])
-    fsspec.filesystem("memory").rm(str(found[1].source))
-    _, result = run(lake, found)
+def test_a_missing_clip_is_reported_and_the_others_are_watched(memory: str, tmp_path: Path) -> None:
+    lake, clip_list = Lake.create(tmp_path / "lake"), clips_of([memory])
+    fsspec.filesystem("memory").rm(str(clip_list[1].source))
+    _, result = run(lake, clip_list)
     assert result.added == 2
-    assert [f.source for f in result.failed] == [str(found[1].source)]
+    assert [f.source for f in result.failed] == [str(clip_list[1].source)]
     assert "it cannot be read" in result.failed[0].reason
 
 
-@pytest.mark.parametrize("word", ["memory://nowhere/x.mp4", "nonsense://x/y.mp4"])
-def test_what_is_no_clip_is_refused(word: str) -> None:
-    with pytest.raises(SourceError, match="it cannot be read") as told:
-        clips_of([word])
-    assert word in str(told.value)
+@pytest.mark.parametrize("source", ["memory://nowhere/x.mp4", "nonsense://x/y.mp4"])
+def test_a_url_without_a_clip_is_refused(source: str) -> None:
+    with pytest.raises(SourceError, match="it cannot be read") as caught:
+        clips_of([source])
+    assert source in str(caught.value)
 
 
-def test_a_manifest_in_parquet_says_the_same_as_in_csv(memory: str, tmp_path: Path) -> None:
+def test_a_parquet_manifest_equals_the_csv_one(memory: str, tmp_path: Path) -> None:
     (tmp_path / "m1.mp4").touch()
     rows: dict[str, list[Any]] = {
         "source": ["m1.mp4", f"{memory}/a.mp4"],

@@ -1,4 +1,4 @@
-"""Ways of watching that take no time: what is seen is scripted, and some clips are not what they seem.
+"""Scripted functions for watching that take no time; some clips fail or kill their worker.
 
 Workers import these, so that they stand in a module.
 """
@@ -31,9 +31,9 @@ def scripted(settings: WatchSettings, folder: Path) -> None:
 def clips(folder: Path, *texts: str) -> list[Clip]:
     """Clips with some content."""
     folder.mkdir(exist_ok=True)
-    made = []
+    clip_list = []
     for number, text in enumerate(texts):
         path = folder / f"clip-{number}.mp4"
         path.write_text(text)
-        made.append(Clip(path, taken=1e9))
-    return made
+        clip_list.append(Clip(path, taken=1e9))
+    return clip_list
