@@ -183,7 +183,7 @@ def _relation(script: Script, name: str, pair: tuple[int, int], time: float) -> 
 
 @dataclass(frozen=True)
 class ScriptedRun:
-    """What a reasoner made of a script: its minds and all it told."""
+    """The result of reasoning about a script: all minds and outcomes."""
 
     minds: tuple[Mind, ...]
     outcomes: tuple[Outcome, ...]

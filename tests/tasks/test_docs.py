@@ -18,7 +18,7 @@ BLOCKS = [
 
 
 @pytest.mark.parametrize("block", BLOCKS)
-def test_every_example_of_the_page_is_in_the_language(block: str) -> None:
+def test_every_example_of_the_page_can_be_parsed(block: str) -> None:
     task = read(block)
     assert str(task)
     assert read(str(task)) == task
@@ -30,11 +30,11 @@ def test_the_page_lists_every_code_action_and_shipped_task() -> None:
     assert all(f"`{name}`" in PAGE for name in shipped_tasks())
 
 
-def test_the_page_says_rightly_what_binds_tighter() -> None:
-    one = read("<t> ::= a(x) & b(x) for 5 s c(x) | d(x)")
-    assert one == read("<t> ::= ((a(x) & (b(x) for 5 s)) c(x)) | d(x)")
+def test_the_documented_precedence_is_correct() -> None:
+    task = read("<t> ::= a(x) & b(x) for 5 s c(x) | d(x)")
+    assert task == read("<t> ::= ((a(x) & (b(x) for 5 s)) c(x)) | d(x)")
 
 
 def test_the_page_lists_every_word_for_a_colour() -> None:
-    (said,) = re.findall(r"The words for colours are (.*?), each also with", PAGE, re.S)
-    assert set(re.split(r",\s+|\s+and\s+", said)) == set(TERMS)
+    (words,) = re.findall(r"The words for colours are (.*?), each also with", PAGE, re.S)
+    assert set(re.split(r",\s+|\s+and\s+", words)) == set(TERMS)

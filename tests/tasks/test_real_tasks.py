@@ -68,12 +68,12 @@ def played(trace: Trace) -> Verdict:
     return finish(task_of(play(task_reasoner([task]), script, last + 14.0, fps=5.0)))
 
 
-def test_there_are_twelve() -> None:
+def test_there_are_twelve_real_tasks() -> None:
     assert len(PAGES) == 12
     assert {t.page for t in traces() if t.kind == "good"} == {p.stem for p in PAGES}
     assert {t.page for t in traces() if t.kind == "bad"} == {p.stem for p in PAGES}
 
 
 @pytest.mark.parametrize("trace", traces(), ids=str)
-def test_a_trace_has_the_verdict_that_its_page_says(trace: Trace) -> None:
+def test_each_trace_has_its_documented_verdict(trace: Trace) -> None:
     assert (played(trace) is Verdict.SUCCEEDED) == (trace.kind == "good")

@@ -1,4 +1,4 @@
-"""What is done before what must come first: every way to it leads through a step that is lacking."""
+"""Steps out of turn: every course to them leads through a step that is missing."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ def automaton_of(course: str, stages: Iterable[str]) -> Automaton:
     return Automaton(parse_task("\n".join([f"<t> ::= {course}", *lines])))
 
 
-def found(course: str, stages: str, held: str, lacking: str) -> tuple[str, str] | None:
+def early_step(course: str, stages: str, held: str, lacking: str) -> tuple[str, str] | None:
     """The stages of what is out of turn at the start, and of what must come first."""
     automaton = automaton_of(course, stages)
     nodes = [n for n, _ in automaton.start]
     steps = [s for s in later_steps(automaton, nodes) if s.stage in held]
-    got = out_of_turn(automaton, nodes, steps, lambda s: s.stage in lacking)
-    return None if got is None else (got[0].stage, got[1].stage)
+    result = out_of_turn(automaton, nodes, steps, lambda s: s.stage in lacking)
+    return None if result is None else (result[0].stage, result[1].stage)
 
 
 ROW = "abcde"
@@ -37,7 +37,7 @@ def test_the_first_held_action_behind_a_missing_one_is_found(
     behind = [s for s in ROW if s in held and any(x in lacking for x in ROW[: ROW.index(s)])]
     expected = (behind[0], min(lacking)) if behind else None
     course = " ".join(f"<{s}>" for s in ROW)
-    assert found(course, ROW, "".join(held), "".join(lacking)) == expected
+    assert early_step(course, ROW, "".join(held), "".join(lacking)) == expected
 
 
 @pytest.mark.parametrize(
@@ -57,8 +57,10 @@ def test_the_first_held_action_behind_a_missing_one_is_found(
         ("<a> <b> <c>", "", "ab", None),
     ],
 )
-def test_courses(course: str, held: str, lacking: str, expected: tuple[str, str] | None) -> None:
-    assert found(course, "abc", held, lacking) == expected
+def test_early_steps_are_found_in_each_kind_of_course(
+    course: str, held: str, lacking: str, expected: tuple[str, str] | None
+) -> None:
+    assert early_step(course, "abc", held, lacking) == expected
 
 
 def test_an_endless_task_is_searched_up_to_a_limit() -> None:

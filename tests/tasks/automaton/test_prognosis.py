@@ -1,4 +1,4 @@
-"""What supervision tells beyond statuses: how sure it is, what comes next, what is taken back."""
+"""What supervision reports beyond statuses: confidence, prospects, revisions."""
 
 from __future__ import annotations
 
@@ -48,20 +48,20 @@ def test_hypotheses_sum_to_one_and_reported_beliefs_are_marginals(
         masses = [w.mass for w in weighted]
         assert math.isclose(sum(masses), 1.0)
         assert masses == sorted(masses, reverse=True)
-        told = mind.tasks[0]
-        if told.verdict is Verdict.IN_PROGRESS:
-            here = [w.mass for w in weighted if told.current in under_way(w.value)]
-            assert told.confidence == pytest.approx(sum(here))
-        elif told.verdict is Verdict.SUCCEEDED:
+        task = mind.tasks[0]
+        if task.verdict is Verdict.IN_PROGRESS:
+            masses_of_stage = [w.mass for w in weighted if task.current in under_way(w.value)]
+            assert task.confidence == pytest.approx(sum(masses_of_stage))
+        elif task.verdict is Verdict.SUCCEEDED:
             done = [w.mass for w in weighted if w.value.finished is not None]
-            assert told.confidence == pytest.approx(sum(done))
+            assert task.confidence == pytest.approx(sum(done))
 
 
 def test_confidence_does_not_depend_on_the_frame_rate() -> None:
     runs = [watch(*FAILS, until=15.0, fps=fps) for fps in (5.0, 10.0, 25.0)]
     for time in (8.0, 12.6, 15.0):
-        told = [belief(run, time).confidence for run in runs]
-        assert max(told) - min(told) < 0.1
+        confidences = [belief(run, time).confidence for run in runs]
+        assert max(confidences) - min(confidences) < 0.1
 
 
 def test_prospects_have_probabilities() -> None:
@@ -77,11 +77,11 @@ def test_prospects_have_probabilities() -> None:
         text="<t> ::= <go> (<on> | <back> <t>)\n<go> ::= converging(arm, satellite)\n"
         "<on> ::= coupled(arm, satellite)\n<back> ::= diverging(arm, satellite)",
     )
-    told = {p.stage: p.probability for p in belief(retry, 0.8).prospects}
-    assert told == {"on": pytest.approx(0.5, abs=0.1), "back": pytest.approx(0.5, abs=0.1)}
+    probabilities = {p.stage: p.probability for p in belief(retry, 0.8).prospects}
+    assert probabilities == {"on": pytest.approx(0.5, abs=0.1), "back": pytest.approx(0.5, abs=0.1)}
 
 
-def test_what_comes_next_has_room_for_what_ends_well() -> None:
+def test_success_is_no_likelier_than_all_prospects_together() -> None:
     """What fails is not told to go to its end with 93 % and to end well with 27 % at once."""
     played = watch(*FAILS)
     for mind in played.minds[3:]:
@@ -98,9 +98,9 @@ def test_success_falls_with_a_failure_and_rises_towards_the_end() -> None:
     good, bad = watch(*SUCCEEDS), watch(*FAILS)
 
     def hope(played: ScriptedRun, time: float) -> float:
-        found = belief(played, time).success
-        assert found is not None
-        return found
+        success = belief(played, time).success
+        assert success is not None
+        return success
 
     assert hope(good, 20.0) > hope(good, 13.0) > hope(good, 5.0) > 0.6
     assert hope(good, 20.0) > 0.95
@@ -118,16 +118,16 @@ def test_a_stage_reported_done_is_revised_when_later_evidence_contradicts_it() -
     )
     assert belief(played, 8.0).current == "captured"
     assert played.last.tasks[0].current == "approach"
-    taken = [e for e in played.events if e.kind == "stage_revised"]
-    assert [e.data["stage"] for e in taken] == ["approach"]
-    assert "reported complete at 5." in taken[0].text
-    assert "is now believed not to have happened" in taken[0].text
+    revisions = [e for e in played.events if e.kind == "stage_revised"]
+    assert [e.data["stage"] for e in revisions] == ["approach"]
+    assert "reported complete at 5." in revisions[0].text
+    assert "is now believed not to have happened" in revisions[0].text
     assert not [e for e in watch(*SUCCEEDS).events if e.kind == "stage_revised"]
 
 
 def test_uncertain_relations_count_for_less() -> None:
-    for seen in (ActionStatus.NEITHER, ActionStatus.CONTRARY):
-        fits = [SUPERVISION_HMM.fit(seen, sure, 1.0) for sure in (1.0, 0.7, 0.3, 0.0)]
+    for status in (ActionStatus.NEITHER, ActionStatus.CONTRARY):
+        fits = [SUPERVISION_HMM.fit(status, confidence, 1.0) for confidence in (1.0, 0.7, 0.3, 0.0)]
         assert fits == sorted(fits)
         assert fits[-1] == pytest.approx(1.0)
     halves = SUPERVISION_HMM.fit(ActionStatus.CONTRARY, 0.8, 0.5) ** 2
@@ -136,13 +136,13 @@ def test_uncertain_relations_count_for_less() -> None:
 
 def test_prospects_are_one_line_of_text() -> None:
     played = watch(*SUCCEEDS)
-    said = prospects_text(belief(played, 6.0))
-    assert said.startswith("next: `captured` (")
-    assert "ends well with a probability of 8" in said
+    text = prospects_text(belief(played, 6.0))
+    assert text.startswith("next: `captured` (")
+    assert "ends well with a probability of 8" in text
     assert prospects_text(TaskBelief("t", Verdict.UNKNOWN)) == "next: unknown"
 
 
-def test_not_seen_speaks_less_against_a_course_than_seen_otherwise() -> None:
+def test_absence_of_evidence_counts_less_than_contrary_evidence() -> None:
     fit = SUPERVISION_HMM.fit
     order = [
         fit(s, 1.0, 1.0)
@@ -156,7 +156,7 @@ def test_not_seen_speaks_less_against_a_course_than_seen_otherwise() -> None:
     assert order == sorted(order)
 
 
-def test_a_stage_that_comes_back_to_itself_inside_another_is_not_looked_into_for_ever() -> None:
+def test_a_recursive_stage_inside_another_is_expanded_finitely() -> None:
     task = parse_task(
         "<t> ::= <loop>\n<loop> ::= converging(arm, satellite)"
         " | touching(arm, satellite) & (diverging(arm, satellite) <loop>)"

@@ -35,22 +35,22 @@ LAW = settings(max_examples=40, deadline=None)
 
 
 def seeing(*holding: str, among: str = "abc") -> dict[ActionKey, ActionEvidence]:
-    seen = {k: ActionStatus.HOLDS if k in holding else ActionStatus.NEITHER for k in among}
-    return {(k, ("x",)): ActionEvidence(s) for k, s in seen.items()}
+    statuses = {k: ActionStatus.HOLDS if k in holding else ActionStatus.NEITHER for k in among}
+    return {(k, ("x",)): ActionEvidence(s) for k, s in statuses.items()}
 
 
 def followed(
-    recogniser: HiddenFilter, told: str, among: str = "abc", dt: float = 0.2
+    recogniser: HiddenFilter, letters: str, among: str = "abc", dt: float = 0.2
 ) -> list[HiddenPosterior]:
     """Beliefs after each letter of what is seen; `.` for nothing at all."""
     beliefs = [recogniser.start()]
-    for letter in told:
-        seen = {} if letter == "." else seeing(letter, among=among)
-        beliefs.append(recogniser.step(beliefs[-1], seen, dt))
+    for letter in letters:
+        observed = {} if letter == "." else seeing(letter, among=among)
+        beliefs.append(recogniser.step(beliefs[-1], observed, dt))
     return beliefs
 
 
-def test_small_tasks_are_recognised_as_by_enumerating_all_histories() -> None:
+def test_the_filter_agrees_with_enumeration_on_small_tasks() -> None:
     agreed = compare(25, first=5_000)
     assert agreed.steps > 100
     assert agreed.worst <= 1e-6
@@ -60,20 +60,20 @@ def test_small_tasks_are_recognised_as_by_enumerating_all_histories() -> None:
 
 @LAW
 @given(st.integers(0, 10**6), st.sampled_from([0.04, 0.3, 5.0]))
-def test_passages_from_a_place_share_all_of_its_mass(seed: int, dt: float) -> None:
+def test_transition_probabilities_from_a_state_sum_to_one(seed: int, dt: float) -> None:
     task = read(text_of(Draw(random.Random(seed)).rules()))
     recogniser = hidden_filter(task)
     transitions = HiddenTransitions(recogniser.automaton, DEFAULT_HMM)
-    places = [p for p, _ in transitions.begin()]
-    for place in places[:5]:
-        passages = transitions.transitions(place, dt)
-        assert sum(p.chance for p in passages) == pytest.approx(1.0)
-        places += [p.to for p in passages]
+    states = [p for p, _ in transitions.begin()]
+    for state in states[:5]:
+        outgoing = transitions.transitions(state, dt)
+        assert sum(p.chance for p in outgoing) == pytest.approx(1.0)
+        states += [p.to for p in outgoing]
 
 
 @pytest.mark.parametrize("step", [HELD, PLAIN])
 @given(dt=st.floats(0.001, 100.0))
-def test_changes_of_a_phase_share_all_of_its_mass(step: TaskStep, dt: float) -> None:
+def test_phase_change_probabilities_sum_to_one(step: TaskStep, dt: float) -> None:
     for phase in range(DEFAULT_HMM.count(step) + 3):
         changes = list(DEFAULT_HMM.changes(step, phase, dt))
         assert sum(p for _, p in changes) == pytest.approx(1.0)
@@ -81,13 +81,11 @@ def test_changes_of_a_phase_share_all_of_its_mass(step: TaskStep, dt: float) -> 
 
 
 @given(st.sampled_from(PhaseKind), st.floats(0.0, 1.0))
-def test_what_is_seen_is_seen_with_some_probability_whatever_is_going_on(
-    kind: PhaseKind, sure: float
-) -> None:
+def test_emission_probabilities_sum_to_one(kind: PhaseKind, confidence: float) -> None:
     assert sum(DEFAULT_HMM.chances[kind]) == pytest.approx(1.0)
-    assert DEFAULT_HMM.likelihood(kind, ActionStatus.UNKNOWN, sure) == 1.0
-    for seen in ActionStatus:
-        assert DEFAULT_HMM.likelihood(kind, seen, 0.0) == pytest.approx(1.0)
+    assert DEFAULT_HMM.likelihood(kind, ActionStatus.UNKNOWN, confidence) == 1.0
+    for status in ActionStatus:
+        assert DEFAULT_HMM.likelihood(kind, status, 0.0) == pytest.approx(1.0)
 
 
 def test_unknown_observations_change_only_the_time() -> None:
@@ -99,8 +97,8 @@ def test_unknown_observations_change_only_the_time() -> None:
         == recogniser.step(before, {}, 0.5).hypotheses
     )
     same = recogniser.step(before, unknown, 0.0)
-    for place, weighed in before.hypotheses.items():
-        assert same.hypotheses[place].mass == pytest.approx(weighed.mass)
+    for state, weighed in before.hypotheses.items():
+        assert same.hypotheses[state].mass == pytest.approx(weighed.mass)
 
 
 @LAW
@@ -115,16 +113,16 @@ def test_the_filter_does_not_depend_on_the_division_of_time(seed: int) -> None:
     middle = before
     for _ in range(10):
         middle = recogniser.step(middle, {}, 0.02)
-    one, other = recogniser.stages(short), recogniser.stages(middle)
-    for key, chance in one.items():
-        assert other.get(key, 0.0) == pytest.approx(chance, abs=0.002)
+    fine, coarse = recogniser.stages(short), recogniser.stages(middle)
+    for key, chance in fine.items():
+        assert coarse.get(key, 0.0) == pytest.approx(chance, abs=0.002)
 
 
 def test_a_task_is_followed_from_stage_to_stage() -> None:
     recogniser = hidden_filter(read(ROW))
     beliefs = followed(recogniser, "aaaaaabbbbbbcccccc")
-    told = [recogniser.most_likely(b)[0] for b in beliefs[1:]]
-    assert told == sorted(told, key=["one", "two", "three"].index)
+    stages = [recogniser.most_likely(b)[0] for b in beliefs[1:]]
+    assert stages == sorted(stages, key=["one", "two", "three"].index)
     assert recogniser.most_likely(beliefs[6]) == ("one", Status.PROGRESSING)
     stage, chance = recogniser.ranking(beliefs[-1])[0]
     assert stage == "three"
@@ -137,17 +135,21 @@ def test_one_wrong_observation_does_not_mislead_the_filter() -> None:
     assert {recogniser.most_likely(b)[0] for b in beliefs[4:]} == {"one"}
 
 
-def test_a_contrary_that_lasts_is_failing_and_ends_it() -> None:
+def test_lasting_contrary_evidence_makes_a_stage_fail() -> None:
     recogniser = hidden_filter(read(ROW))
     belief = followed(recogniser, "aaaaa")[-1]
-    hopes = [recogniser.success(belief)]
+    successes = [recogniser.success(belief)]
     for _ in range(6):
-        seen = {**seeing(), ("a", ("x",)): ActionEvidence(ActionStatus.CONTRARY)}
-        belief = recogniser.step(belief, seen, 0.2)
-        hopes.append(recogniser.success(belief))
+        observed = {**seeing(), ("a", ("x",)): ActionEvidence(ActionStatus.CONTRARY)}
+        belief = recogniser.step(belief, observed, 0.2)
+        successes.append(recogniser.success(belief))
     assert recogniser.most_likely(belief) == ("one", Status.FAILING)
-    assert hopes == sorted(hopes, reverse=True)
-    assert recogniser.success(followed(recogniser, "aaaaabbbbbccccc")[-1]) > hopes[0] > hopes[-1]
+    assert successes == sorted(successes, reverse=True)
+    assert (
+        recogniser.success(followed(recogniser, "aaaaabbbbbccccc")[-1])
+        > successes[0]
+        > successes[-1]
+    )
 
 
 def test_possible_next_stages_have_equal_probability() -> None:
@@ -170,7 +172,7 @@ def test_what_comes_next_is_a_stage_however_many_steps_away() -> None:
 
 @LAW
 @given(st.floats(0.0, 1.0), st.sampled_from([ROW, "<t> ::= (a(x) for 2 s b(x))+ c(x)?"]))
-def test_success_is_a_part_of_what_comes_next(lose: float, text: str) -> None:
+def test_success_is_among_the_next_stages(lose: float, text: str) -> None:
     recogniser = hidden_filter(read(text), StageHmm(lose=lose))
     start = recogniser.start()
     coming = sum(chance for _, chance in recogniser.next_stages(start))
@@ -203,11 +205,11 @@ def test_conclusions_that_later_evidence_contradicts_are_revised() -> None:
     task = "<t> ::= a(x) | <long> <other>\n<long> ::= b(x)\n<other> ::= c(x)"
     recogniser = hidden_filter(read("<t> ::= <one> <two>\n<one> ::= a(x)\n<two> ::= b(x)"))
     beliefs = followed(recogniser, "aaaaabbb" + "a" * 12, among="ab")
-    taken = taken_back(beliefs)
-    assert [r.step.stage for r in taken] == ["one"]
-    assert 1.0 < taken[0].reported < taken[0].revised
-    assert "`one`, reported complete at" in str(taken[0])
-    assert "now believed not to have happened" in str(taken[0])
+    revised = taken_back(beliefs)
+    assert [r.step.stage for r in revised] == ["one"]
+    assert 1.0 < revised[0].reported < revised[0].revised
+    assert "`one`, reported complete at" in str(revised[0])
+    assert "now believed not to have happened" in str(revised[0])
     steady = followed(hidden_filter(read(task)), "bbbbbbccccc")
     assert not taken_back(steady)
 
@@ -221,7 +223,7 @@ def test_a_retry_is_followed_however_often_it_comes() -> None:
     assert len(recogniser.automaton) < 20  # a retry at the end of its task needs no stack
 
 
-def test_a_task_that_holds_itself_within_itself_is_looked_into_no_further_than_is_bounded() -> None:
+def test_a_recursive_task_is_expanded_within_a_bound() -> None:
     task = read("<t> ::= any order (<u>, e(x)?) | b(x) <t>\n<u> ::= d(x)? | c(x) <t>")
     recogniser = hidden_filter(task)
     assert 0.5 < recogniser.success(recogniser.start()) < 1.0
@@ -231,12 +233,15 @@ def test_a_task_that_holds_itself_within_itself_is_looked_into_no_further_than_i
 def test_states_are_limited_and_the_dropped_mass_is_recorded() -> None:
     task = read("<t> ::= any order (a(x), b(x), c(x), d(x), e(x))")
     few, all_of_them = hidden_filter(task, most=40), hidden_filter(task, most=10**6, least=0.0)
-    told = "aaaaaccccceeeee"
-    one, other = followed(few, told, "abcde")[-1], followed(all_of_them, told, "abcde")[-1]
-    assert len(one.hypotheses) <= 40 < len(other.hypotheses)
-    assert 0.0 < one.lost < 0.05
-    assert other.lost == pytest.approx(0.0, abs=1e-12)
-    assert few.most_likely(one) == all_of_them.most_likely(other)
+    letters = "aaaaaccccceeeee"
+    limited, unlimited = (
+        followed(few, letters, "abcde")[-1],
+        followed(all_of_them, letters, "abcde")[-1],
+    )
+    assert len(limited.hypotheses) <= 40 < len(unlimited.hypotheses)
+    assert 0.0 < limited.lost < 0.05
+    assert unlimited.lost == pytest.approx(0.0, abs=1e-12)
+    assert few.most_likely(limited) == all_of_them.most_likely(unlimited)
 
 
 def test_the_truth_is_dropped_no_more_often_than_recorded() -> None:
@@ -247,9 +252,9 @@ def test_the_truth_is_dropped_no_more_often_than_recorded() -> None:
     for seed in range(60):
         truths, belief = drawn(recogniser, random.Random(seed)), recogniser.start()
         missed = False
-        for place, seen in truths:
-            belief = recogniser.step(belief, seen, 1.0)
-            missed = missed or place not in belief.hypotheses
+        for state, observed in truths:
+            belief = recogniser.step(belief, observed, 1.0)
+            missed = missed or state not in belief.hypotheses
         dropped += missed
         accounted += belief.lost
     assert dropped > 0
@@ -261,18 +266,18 @@ def drawn(
 ) -> list[tuple[HiddenState, dict[ActionKey, ActionEvidence]]]:
     """Where a task is at each second, and what is seen of it, by the model itself."""
     transitions = HiddenTransitions(recogniser.automaton, DEFAULT_HMM)
-    place = rng.choice([p for p, _ in transitions.begin()])
-    found = []
+    state = rng.choice([p for p, _ in transitions.begin()])
+    stream = []
     for _ in range(25):
-        passages = transitions.transitions(place, 1.0)
-        place = rng.choices(passages, [p.chance for p in passages])[0].to
-        asked = dict(transitions.required(place))
-        seen = {}
+        outgoing = transitions.transitions(state, 1.0)
+        state = rng.choices(outgoing, [p.chance for p in outgoing])[0].to
+        required = dict(transitions.required(state))
+        observed = {}
         for key in seeing():
-            chances = DEFAULT_HMM.chances[asked.get(key, PhaseKind.WAITING)]
-            seen[key] = ActionEvidence(ActionStatus(rng.choices(range(3), chances)[0]))
-        found.append((place, seen))
-    return found
+            chances = DEFAULT_HMM.chances[required.get(key, PhaseKind.WAITING)]
+            observed[key] = ActionEvidence(ActionStatus(rng.choices(range(3), chances)[0]))
+        stream.append((state, observed))
+    return stream
 
 
 def test_large_tasks_are_followed_through_wrong_verdicts() -> None:

@@ -36,48 +36,51 @@ def mind_of(speeds: Mapping[int, float], *objects: ObjectBelief) -> Mind:
     return mind.remember(RELATIONS, RelationMemory(measured=now))
 
 
-def who(bindings: tuple[Binding, ...]) -> dict[str, tuple[int | None, bool]]:
+def cast(bindings: tuple[Binding, ...]) -> dict[str, tuple[int | None, bool]]:
     return {b.actor: (b.object_id, b.guessed) for b in bindings}
 
 
 STRANGER, SHADOW = sized(2, {}, 5000.0), sized(3, {}, 1000.0)
-KNOWN = sized(1, PART, 900.0)
+KNOWN_PART = sized(1, PART, 900.0)
 
 
 @pytest.mark.parametrize(
     ("speeds", "objects", "gripper"),
     [
-        ({2: 80.0}, (KNOWN, STRANGER), (2, True)),
-        ({2: 80.0, 3: 80.0}, (KNOWN, STRANGER, SHADOW), (2, True)),
-        ({}, (KNOWN, STRANGER), (None, False)),  # nothing moves
-        ({1: 80.0, 2: 80.0}, (KNOWN, STRANGER), (None, False)),  # the part moves: by whom?
-        ({2: 80.0, 3: 80.0}, (KNOWN, STRANGER, sized(3, {}, 4000.0)), (None, False)),  # which?
+        ({2: 80.0}, (KNOWN_PART, STRANGER), (2, True)),
+        ({2: 80.0, 3: 80.0}, (KNOWN_PART, STRANGER, SHADOW), (2, True)),
+        ({}, (KNOWN_PART, STRANGER), (None, False)),  # nothing moves
+        ({1: 80.0, 2: 80.0}, (KNOWN_PART, STRANGER), (None, False)),  # the part moves: by whom?
+        ({2: 80.0, 3: 80.0}, (KNOWN_PART, STRANGER, sized(3, {}, 4000.0)), (None, False)),  # which?
         ({2: 80.0}, (STRANGER, SHADOW), (None, False)),  # nobody is known
-        ({2: 80.0}, (KNOWN, sized(2, {"cup": 0.8}, 5000.0)), (None, False)),  # it is a cup
-        ({2: 80.0}, (KNOWN, STRANGER, sized(3, {"gripper": 0.5}, 10.0)), (3, False)),
+        ({2: 80.0}, (KNOWN_PART, sized(2, {"cup": 0.8}, 5000.0)), (None, False)),  # it is a cup
+        ({2: 80.0}, (KNOWN_PART, STRANGER, sized(3, {"gripper": 0.5}, 10.0)), (3, False)),
     ],
 )
 def test_unidentified_actors_are_guessed(
     speeds: Mapping[int, float], objects: tuple[ObjectBelief, ...], gripper: tuple[int | None, bool]
 ) -> None:
-    found = who(match(TASK, mind_of(speeds, *objects)))
-    assert found["gripper"] == gripper
+    bindings = cast(match(TASK, mind_of(speeds, *objects)))
+    assert bindings["gripper"] == gripper
 
 
-def test_a_guess_is_kept_at_rest_and_gives_way_at_once() -> None:
-    first = match(TASK, mind_of({2: 80.0}, KNOWN, STRANGER))
-    kept = match(TASK, mind_of({}, KNOWN, STRANGER), first)
-    assert who(kept)["gripper"] == (2, True)
+def test_a_guess_is_kept_at_rest_and_replaced_by_an_identification() -> None:
+    first = match(TASK, mind_of({2: 80.0}, KNOWN_PART, STRANGER))
+    second = match(TASK, mind_of({}, KNOWN_PART, STRANGER), first)
+    assert cast(second)["gripper"] == (2, True)
     real = sized(3, {"gripper": 0.6}, 300.0)
-    assert who(match(TASK, mind_of({}, KNOWN, STRANGER, real), kept))["gripper"] == (3, False)
+    assert cast(match(TASK, mind_of({}, KNOWN_PART, STRANGER, real), second))["gripper"] == (
+        3,
+        False,
+    )
 
 
-def test_a_guess_explains_nothing_away_and_accuses_nobody() -> None:
-    mind = mind_of({2: 80.0, 3: 80.0}, KNOWN, STRANGER, SHADOW)
+def test_a_guess_leaves_no_object_unexplained() -> None:
+    mind = mind_of({2: 80.0, 3: 80.0}, KNOWN_PART, STRANGER, SHADOW)
     assert unexplained(mind, match(TASK, mind)) == ()
 
 
 def test_an_optional_actor_is_not_guessed() -> None:
     text = "<t> ::= <reach>\n<reach> ::= converging(gripper, part)"
     task = parse_task(f"optional actor gripper is gripper\n{text}")
-    assert who(match(task, mind_of({2: 80.0}, KNOWN, STRANGER)))["gripper"] == (None, False)
+    assert cast(match(task, mind_of({2: 80.0}, KNOWN_PART, STRANGER)))["gripper"] == (None, False)

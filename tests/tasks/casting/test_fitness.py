@@ -30,8 +30,8 @@ def still(*rect: float) -> Path:
 def going(path: Path, vx: float, vy: float = 0.0, since: float = 0.0) -> Path:
     def at(t: float) -> Rect:
         x, y, w, h = path(t)
-        gone = max(0.0, t - since)
-        return x + vx * gone, y + vy * gone, w, h
+        elapsed_s = max(0.0, t - since)
+        return x + vx * elapsed_s, y + vy * elapsed_s, w, h
 
     return at
 
@@ -60,21 +60,21 @@ def _bound(
     names: tuple[tuple[int, str], ...],
     actors: str,
 ) -> list[int | None]:
-    asked = " ".join(f"seen({a})" for a in actors.split())
+    conditions = " ".join(f"seen({a})" for a in actors.split())
     rules = default_reasoners(traits=True)
-    task = task_reasoner([parse_task(f"{declared}\n<t> ::= {asked}")])
+    task = task_reasoner([parse_task(f"{declared}\n<t> ::= {conditions}")])
     mind = Mind()
     for i in range(round(seconds * 25)):
         regions = [box_region(n, path(i / 25)) for n, path in paths]
-        here = {r.id for r in regions if r is not None}
-        said = {n: [(name, 0.9)] for n, name in names if n in here}
-        observation = seen(i, regions, names=said)
-        told = tuple(
+        present = {r.id for r in regions if r is not None}
+        visible_names = {n: [(name, 0.9)] for n, name in names if n in present}
+        observation = seen(i, regions, names=visible_names)
+        colour_percepts = tuple(
             Percept("colour", {"region_id": n, "palette": ((*LAB[c], 0.9),)}, i / 25, "colour")
             for n, c in colours
-            if n in here
+            if n in present
         )
-        report = Report("colour", ReportState.RAN, ("colour",), told)
+        report = Report("colour", ReportState.RAN, ("colour",), colour_percepts)
         observation = replace(observation, reports=(*observation.reports, report))
         for reasoner in (*rules.update, *rules.cogitate, task):
             mind = reasoner(mind, observation).mind
@@ -107,13 +107,13 @@ COLOURED = {1: "red", 2: "blue", 3: "red"}
         ("actor a is what rests and at (80, 220)", [1]),
     ],
 )
-def test_an_unknown_object_is_told_by_what_the_task_says(
+def test_unknown_objects_are_matched_by_the_criteria_of_the_task(
     declared: str, expected: list[int | None]
 ) -> None:
     assert bound(declared, THREE, COLOURED, 3.0) == expected
 
 
-def test_equal_objects_are_kept_apart() -> None:
+def test_equal_objects_are_assigned_to_different_actors() -> None:
     two = "actor a is the leftmost red\nactor b is the rightmost red"
     assert bound(two, THREE, COLOURED, 3.0, actors="a b") == [1, 3]
     other = "actor a is red\nactor b is another red"
@@ -122,13 +122,13 @@ def test_equal_objects_are_kept_apart() -> None:
     assert bound(other, {2: MIDDLE, 3: RIGHT}, COLOURED, 3.0, actors="a b") == [3, None]
 
 
-def test_who_was_the_leftmost_at_first_stays_so_when_places_are_changed() -> None:
+def test_the_initial_order_of_objects_is_kept_when_they_move() -> None:
     swapped = {1: going(LEFT, 150.0, 20.0, 2.0), 3: going(RIGHT, -150.0, -40.0, 2.0)}
     two = "actor a is the leftmost red\nactor b is the rightmost red"
     assert bound(two, swapped, COLOURED, 5.0, actors="a b") == [1, 3]
 
 
-def test_what_enters_is_told_from_what_was_there_and_by_its_side() -> None:
+def test_entering_objects_are_matched_by_the_side_they_enter_from() -> None:
     width = SIZE[0]
     paths = {
         1: MIDDLE,
@@ -139,19 +139,19 @@ def test_what_enters_is_told_from_what_was_there_and_by_its_side() -> None:
         assert bound(f"actor a is what enters from the {side}", paths, None, 6.0) == [expected]
 
 
-def test_the_first_to_move_is_told() -> None:
+def test_the_first_object_to_move_is_matched() -> None:
     paths = {1: going(LEFT, 40.0, since=3.0), 2: MIDDLE, 3: going(RIGHT, 0.0, -40.0, 1.5)}
     assert bound("actor a is what moves first", paths, None, 5.0) == [3]
 
 
-def test_criteria_go_with_models() -> None:
+def test_criteria_can_be_combined_with_models() -> None:
     names = {1: "cup", 2: "cup", 3: "mug"}
     assert bound("actor a is cup and red", THREE, COLOURED, 3.0, names) == [1]
     two = "actor a is cup\nactor b is the other cup"
     assert set(bound(two, THREE, COLOURED, 3.0, names, actors="a b")) == {1, 2}
 
 
-def test_a_part_hangs_together_with_its_machine() -> None:
+def test_a_part_is_matched_by_its_coupling_to_the_machine() -> None:
     names = {1: "arm", 2: "claw", 3: "claw"}
     comes = going(still(221, 205, 30, 30), -60.0)
     paths = {
@@ -166,18 +166,18 @@ def test_a_part_hangs_together_with_its_machine() -> None:
 
 def test_an_answer_of_the_operator_binds_exactly_that_object() -> None:
     task = parse_task("actor a is red\nactor b is another red\n<t> ::= seen(a) seen(b)")
-    said = Mind(objects={i: belief(i, {}) for i in (1, 2)}, answers={2: "a"})
-    assert [b.object_id for b in match(task, said)] == [2, None]
+    mind = Mind(objects={i: belief(i, {}) for i in (1, 2)}, answers={2: "a"})
+    assert [b.object_id for b in match(task, mind)] == [2, None]
 
 
 CAST = {"left": ("leg",), "right": ("leg",), "part": (), "arm": ("rms",)}
 
 
 @pytest.mark.parametrize(
-    ("name", "meant"), [("left", "left"), ("Part", "part"), ("arm", "rms"), ("rms", "rms")]
+    ("name", "model"), [("left", "left"), ("Part", "part"), ("arm", "rms"), ("rms", "rms")]
 )
-def test_an_actor_is_an_answer_by_its_model_where_that_tells_it(name: str, meant: str) -> None:
-    assert resolve_model(Mind(), name, ("rms", "leg"), cast=CAST) == meant
+def test_an_actor_as_an_answer_stands_for_its_model_if_unambiguous(name: str, model: str) -> None:
+    assert resolve_model(Mind(), name, ("rms", "leg"), cast=CAST) == model
 
 
 def test_an_object_answered_as_an_actor_is_believed_to_be_its_model() -> None:

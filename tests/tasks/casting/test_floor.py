@@ -34,7 +34,7 @@ WITHIN: Rect = (300, 150, 40, 150)
 BEFORE: Rect = (300, 200, 40, 230)
 
 
-def judged(text: str, *rects: Rect, zones: tuple[Zone, ...] = (), seconds: float = 4.0) -> Mind:
+def final_mind(text: str, *rects: Rect, zones: tuple[Zone, ...] = (), seconds: float = 4.0) -> Mind:
     rules, task = default_reasoners(), task_reasoner([parse_task(text)])
     names = {i: [(n, 0.9)] for i, n in enumerate(("truck", "dock"), 1)}
     mind = Mind(zones=zones)
@@ -46,39 +46,43 @@ def judged(text: str, *rects: Rect, zones: tuple[Zone, ...] = (), seconds: float
     return mind
 
 
-def told(mind: Mind) -> TaskBelief:
+def task_belief(mind: Mind) -> TaskBelief:
     return mind.tasks[0]
 
 
 def test_a_body_is_in_a_zone_of_the_floor_where_it_stands() -> None:
     text = GROUND + BAY + "<park> ::= inside(truck, bay)"
-    assert told(judged(text, WITHIN)).verdict is Verdict.SUCCEEDED
-    assert told(judged(text, BEFORE)).verdict is not Verdict.SUCCEEDED
+    assert task_belief(final_mind(text, WITHIN)).verdict is Verdict.SUCCEEDED
+    assert task_belief(final_mind(text, BEFORE)).verdict is not Verdict.SUCCEEDED
     image = "zone bay is (200, 200) (440, 200) (440, 420) (200, 420)\n<park> ::= inside(truck, bay)"
-    assert told(judged(image, BEFORE)).verdict is Verdict.SUCCEEDED  # by its outline it is
+    assert (
+        task_belief(final_mind(image, BEFORE)).verdict is Verdict.SUCCEEDED
+    )  # by its outline it is
 
 
-@pytest.mark.parametrize(("most", "verdict"), [("1.3 m", True), ("120 cm", True), ("0.5 m", False)])
-def test_gaps_are_compared_in_metres(most: str, verdict: bool) -> None:
-    text = f"{GROUND}<t> ::= gap(truck, dock) < {most}"
-    mind = judged(text, (150, 300, 40, 100), (450, 350, 40, 50))
-    assert (told(mind).verdict is Verdict.SUCCEEDED) is verdict
+@pytest.mark.parametrize(
+    ("limit", "verdict"), [("1.3 m", True), ("120 cm", True), ("0.5 m", False)]
+)
+def test_gaps_are_compared_in_metres(limit: str, verdict: bool) -> None:
+    text = f"{GROUND}<t> ::= gap(truck, dock) < {limit}"
+    mind = final_mind(text, (150, 300, 40, 100), (450, 350, 40, 50))
+    assert (task_belief(mind).verdict is Verdict.SUCCEEDED) is verdict
 
 
-def test_a_zones_file_tells_the_same(tmp_path: Path) -> None:
+def test_a_zones_file_gives_the_same_ground(tmp_path: Path) -> None:
     path = tmp_path / "zones.toml"
     path.write_text(FILE, "utf-8")
     (zone,) = load_zones(path)
     assert zone.on_floor
-    mind = judged("<t> ::= seen(truck)", WITHIN, zones=(zone,))
+    mind = final_mind("<t> ::= seen(truck)", WITHIN, zones=(zone,))
     assert inside(mind, 1, "bay") == "true"
-    mind = judged("<t> ::= seen(truck)", BEFORE, zones=(zone,))
+    mind = final_mind("<t> ::= seen(truck)", BEFORE, zones=(zone,))
     assert inside(mind, 1, "bay") == reaching(mind, 1, "bay") == "false"
     assert load_ground(path) is not None
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         (FILE.replace("[560, 400]", "[320, 400]").replace("[420, 200]", "[560, 400]"), "line"),
         (FILE.replace("[2, 0], ", ""), "the ground is invalid"),
@@ -86,14 +90,14 @@ def test_a_zones_file_tells_the_same(tmp_path: Path) -> None:
         (FILE.replace("floor = [[0.5, 0], ", "floor = [[0.5, 0]]#"), "corners"),
     ],
 )
-def test_errors_of_a_ground_are_reported(tmp_path: Path, text: str, said: str) -> None:
+def test_errors_of_a_ground_are_reported(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "zones.toml"
     path.write_text(text, "utf-8")
-    with pytest.raises(SettingsError, match=said):
+    with pytest.raises(SettingsError, match=message):
         load_zones(path)
 
 
-def test_metres_need_a_ground_from_somewhere(tmp_path: Path) -> None:
+def test_metres_require_a_ground(tmp_path: Path) -> None:
     task, zones = tmp_path / "park.task", tmp_path / "zones.toml"
     task.write_text("<park> ::= gap(truck, dock) < 1 m", "utf-8")
     zones.write_text(FILE, "utf-8")

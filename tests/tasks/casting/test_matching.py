@@ -42,7 +42,7 @@ def bound(bindings: tuple[Binding, ...]) -> dict[str, int | None]:
 
 @settings(max_examples=100, deadline=None)
 @given(st.lists(shares, max_size=4))
-def test_the_matching_is_the_best_of_all(objects: list[dict[str, float]]) -> None:
+def test_the_matching_is_optimal(objects: list[dict[str, float]]) -> None:
     at = TaskSettings(bind_at=1e-6)
     found = match(DOCK, mind_of(*objects), settings=at)
     total = sum(b.strength for b in found)
@@ -54,7 +54,7 @@ def test_the_matching_is_the_best_of_all(objects: list[dict[str, float]]) -> Non
 
 
 @given(st.integers(1, 4).flatmap(lambda n: st.lists(st.lists(weights, min_size=n, max_size=n))))
-def test_a_matching_weighs_as_much_as_the_best_of_scipy(table: list[list[float]]) -> None:
+def test_the_matching_has_the_weight_of_scipys_optimum(table: list[list[float]]) -> None:
     found = best_matching(table)
     assert len(set(found.values())) == len(found)
     assert all(table[i][j] > 0.0 for i, j in found.items())
@@ -64,7 +64,7 @@ def test_a_matching_weighs_as_much_as_the_best_of_scipy(table: list[list[float]]
     assert sum(table[i][j] for i, j in found.items()) == pytest.approx(best)
 
 
-def test_an_actor_stands_for_the_users_models_then_the_tasks_then_its_own_name() -> None:
+def test_models_of_an_actor_come_from_the_user_the_task_or_its_name() -> None:
     task = parse_task("actor satellite is spartan or hubble\n<t> ::= coupled(arm, satellite)")
     mind = mind_of({"arm": 0.9}, {"hubble": 0.3, "spartan": 0.3, "satellite": 0.4})
     arm, satellite = match(task, mind)
@@ -94,10 +94,10 @@ def test_a_binding_is_kept_through_small_changes_and_while_hidden() -> None:
 
 def test_an_object_that_left_stays_bound_until_another_takes_its_actor() -> None:
     before = match(DOCK, mind_of({"arm": 0.9}))
-    gone = mind_of().with_objects(belief(1, {"arm": 0.9}, Presence.LEFT))
-    assert bound(match(DOCK, gone, before))["arm"] == 1
-    assert bound(match(DOCK, gone))["arm"] is None
-    other = gone.with_objects(belief(2, {"arm": 0.3}))
+    after_exit = mind_of().with_objects(belief(1, {"arm": 0.9}, Presence.LEFT))
+    assert bound(match(DOCK, after_exit, before))["arm"] == 1
+    assert bound(match(DOCK, after_exit))["arm"] is None
+    other = after_exit.with_objects(belief(2, {"arm": 0.3}))
     assert bound(match(DOCK, other, before))["arm"] == 2
 
 
@@ -112,16 +112,16 @@ def test_an_object_that_left_stays_bound_until_another_takes_its_actor() -> None
         ({"satellite": 0.5}, False, ()),
     ],
 )
-def test_objects_that_no_actor_explains(
+def test_objects_without_an_actor_are_unexplained(
     third: dict[str, float], arm_known: bool, expected: tuple[int, ...]
 ) -> None:
     arm = {"arm": 0.9} if arm_known else {"guitar": 0.2}
     mind = replace(mind_of(arm, {"satellite": 0.9}, third), time=10.0)
-    found = match(DOCK, mind)
-    assert unexplained(mind, found) == expected
+    bindings = match(DOCK, mind)
+    assert unexplained(mind, bindings) == expected
 
 
-def test_a_new_identity_does_not_make_an_object_unexplained_while_an_actor_is_looked_for() -> None:
+def test_a_new_identity_is_not_unexplained_while_an_actor_is_missing() -> None:
     """The arm may be told as a dish at first sight; with all actors found there is nothing to wait for."""
     early = replace(mind_of({"guitar": 0.2}, {"satellite": 0.9}, {"dish": 0.8}), time=2.0)
     assert unexplained(early, match(DOCK, early)) == ()
@@ -130,7 +130,7 @@ def test_a_new_identity_does_not_make_an_object_unexplained_while_an_actor_is_lo
 
 
 @pytest.mark.parametrize(("third", "expected"), [({}, ()), ({"dish": 0.8}, (3,))])
-def test_an_unknown_that_holds_an_actor_is_not_one_too_many(
+def test_an_unknown_object_holding_an_actor_is_explained(
     third: dict[str, float], expected: tuple[int, ...]
 ) -> None:
     """Somebody must carry a part, whether the task names him or not; a known thing is another matter."""
@@ -140,7 +140,7 @@ def test_an_unknown_that_holds_an_actor_is_not_one_too_many(
     assert unexplained(holding, match(DOCK, holding)) == expected
 
 
-def test_what_is_hidden_is_not_one_too_many_in_view() -> None:
+def test_hidden_objects_are_not_unexplained() -> None:
     mind = mind_of({"arm": 0.9}, {"satellite": 0.9}).with_objects(
         belief(3, {"dish": 0.8}, Presence.HIDDEN)
     )

@@ -9,18 +9,18 @@ from visup.tasks.diagnostics.explain import explain
 
 
 @pytest.mark.parametrize("code", CODES)
-def test_the_wrong_example_of_a_code_has_its_mistake_alone_and_the_right_one_none(
+def test_examples_of_error_codes_have_exactly_their_mistake(
     code: str,
 ) -> None:
-    said = explain(code)
-    assert said.title == CODES[code]
-    assert said.why.endswith(".")
-    if said.wrong:
-        assert [f.code for f in diagnose(said.wrong)[1]] == [code]
-        assert diagnose(said.right)[1] == []
+    explanation = explain(code)
+    assert explanation.title == CODES[code]
+    assert explanation.why.endswith(".")
+    if explanation.wrong:
+        assert [f.code for f in diagnose(explanation.wrong)[1]] == [code]
+        assert diagnose(explanation.right)[1] == []
 
 
-def test_codes_are_found_as_they_are_shown_and_others_are_told() -> None:
+def test_error_codes_are_found_as_printed_and_unknown_ones_refused() -> None:
     assert explain("[e102]") == explain("E102")
     assert "wrong:\n    <dock> = " in str(explain("E102"))
     with pytest.raises(TaskError, match="no code `E999`"):

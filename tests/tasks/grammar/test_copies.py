@@ -20,19 +20,20 @@ actor leg_3 is another leg
 """
 
 
-def test_several_things_are_said_shorter() -> None:
+def test_several_objects_of_a_kind_can_be_declared_together() -> None:
     assert read("<table> ::= for each of 3 legs <mount(leg)>\n" + MOUNT) == read(LONG + MOUNT)
 
 
 @pytest.mark.parametrize(
-    ("plural", "one"), [("legs", "leg"), ("boxes", "box"), ("bodies", "body"), ("sheep", "sheep")]
+    ("plural", "singular"),
+    [("legs", "leg"), ("boxes", "box"), ("bodies", "body"), ("sheep", "sheep")],
 )
-def test_one_of_them_is_what_the_course_calls_it(plural: str, one: str) -> None:
-    task = read(f"<t> ::= for each of 2 {plural} touching({one}, bin)")
-    assert [a.name for a in task.actors] == [f"{one}_1", f"{one}_2"]
+def test_the_singular_names_the_actors(plural: str, singular: str) -> None:
+    task = read(f"<t> ::= for each of 2 {plural} touching({singular}, bin)")
+    assert [a.name for a in task.actors] == [f"{singular}_1", f"{singular}_2"]
 
 
-def test_what_is_said_of_the_kind_is_said_of_each() -> None:
+def test_a_declaration_of_the_kind_applies_to_each_actor() -> None:
     task = parse_task("actor leg is red\n<t> ::= for each of 2 legs touching(leg, top)")
     assert list(map(str, task.actors)) == ["actor leg_1 is red", "actor leg_2 is another red"]
     again = "actor leg_2 is green\n<t> ::= for each of 2 legs touching(leg, top)"
@@ -43,7 +44,7 @@ TAKE = "<take(part)> ::= coupled(arm, part) decoupled(arm, part)\n"
 
 
 @pytest.mark.parametrize(
-    ("loop", "least", "most"),
+    ("loop", "min_rounds", "max_rounds"),
     [
         ("for each new part <take(part)>", 1, None),
         ("(for each new part <take(part)>)*", 0, None),
@@ -52,12 +53,12 @@ TAKE = "<take(part)> ::= coupled(arm, part) decoupled(arm, part)\n"
         ("for each new part <take(part)> at most 5 times", 1, 5),
     ],
 )
-def test_a_loop_with_something_new_says_how_many_rounds_it_has(
-    loop: str, least: int, most: int | None
+def test_a_loop_over_new_objects_has_bounds_on_its_rounds(
+    loop: str, min_rounds: int, max_rounds: int | None
 ) -> None:
     task = parse_task(f"<empty> ::= {loop} gone(arm)\n{TAKE}never touching(part, floor)")
     (course,) = (c for c in walk(body_of(task)) if isinstance(c, AnyOrder))
-    assert (course.least, course.count, course.new) == (least, most, "part")
+    assert (course.least, course.count, course.new) == (min_rounds, max_rounds, "part")
     assert parse_task(str(task)) == task
     assert {a.spare for a in task.actors} == {"part"}
     assert {str(i) for i in task.invariants} == {
@@ -65,7 +66,7 @@ def test_a_loop_with_something_new_says_how_many_rounds_it_has(
     }
 
 
-def test_the_rounds_of_a_loop_are_those_of_any_so_many_of_them() -> None:
+def test_a_loop_is_equivalent_to_any_number_of_its_rounds() -> None:
     loop = read(f"<t> ::= for each new part <take(part)> at most 2 times gone(arm)\n{TAKE}")
     some = ", ".join(f"<take(part_{k})>" for k in range(1, 13))
     twin = read(f"<t> ::= (any 1 of ({some}) | any 2 of ({some})) gone(arm)\n{TAKE}")
@@ -80,10 +81,10 @@ def body_of(task: Task) -> Course:
 
 def ordered(task: Task) -> set[str]:
     """The first courses of a task, its parts numbered as they come."""
-    found = set()
+    courses = set()
     for trace in islice(traces(task), 40):
         text = " | ".join(step for moment in trace for step in moment)
         for k, name in enumerate(dict.fromkeys(re.findall(r"part_\d+", text)), 1):
             text = re.sub(rf"\b{name}\b", f"part {k}", text)
-        found.add(text)
-    return found
+        courses.add(text)
+    return courses

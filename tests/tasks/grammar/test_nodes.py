@@ -13,7 +13,7 @@ LAW = settings(max_examples=50, deadline=None)
 
 @LAW
 @given(tasks)
-def test_a_printed_tree_reads_back_as_itself(task: Task) -> None:
+def test_a_printed_tree_is_parsed_back(task: Task) -> None:
     assert read(str(task)) == task
 
 
@@ -52,31 +52,31 @@ def test_printing_is_stable(task: Task) -> None:
         "a(x) ends when not not b(x)",
     ],
 )
-def test_brackets_are_kept_where_they_mean_something_and_nowhere_else(course: str) -> None:
+def test_necessary_brackets_are_kept(course: str) -> None:
     text = f"<t> ::= {course}"
     if course.startswith("(("):
         text = "<t> ::= ((a(x) b(x)) c(x)) d(x)"
     assert str(read(text)) == text
 
 
-def test_needless_brackets_go() -> None:
+def test_redundant_brackets_are_removed() -> None:
     assert str(read("<t> ::= ((a(x)) (b(x)))")) == "<t> ::= a(x) b(x)"
 
 
-def test_places_take_no_part_in_equality_but_are_right() -> None:
-    one, other = read("<t> ::= a(x, y)"), read("# first\n  <t>\n ::=   a( x,\n y)")
-    assert one == other
-    assert hash(one) == hash(other)
-    first, second = one.stages[0].body, other.stages[0].body
+def test_positions_are_correct_and_ignored_by_equality() -> None:
+    plain, spaced = read("<t> ::= a(x, y)"), read("# first\n  <t>\n ::=   a( x,\n y)")
+    assert plain == spaced
+    assert hash(plain) == hash(spaced)
+    first, second = plain.stages[0].body, spaced.stages[0].body
     assert isinstance(first, Action)
     assert isinstance(second, Action)
     assert (first.span.line, first.span.column) == (1, 9)
     assert (second.span.line, second.span.column, second.span.end_line) == (3, 8, 4)
-    place = actors_of(second)[1].span
-    assert (place.line, place.column) == (4, 2)
+    span = actors_of(second)[1].span
+    assert (span.line, span.column) == (4, 2)
 
 
-def test_walking_meets_every_course_outermost_first() -> None:
+def test_walk_is_a_preorder_traversal() -> None:
     a, b, c = (Action(n, (Name("x"),)) for n in "abc")
     inner = Sequence((b, c))
     whole = Sequence((a, inner))

@@ -83,7 +83,7 @@ BAD_GAPS: Gaps = {
 }
 
 
-def lived(name: str, days: Days, gaps: Gaps) -> Verdict:
+def final_verdict(name: str, days: Days, gaps: Gaps) -> Verdict:
     task = load_task(name)
     numbers = {a: i for i, a in enumerate(task_actors(task), 1)}
     if name == "handover":
@@ -97,14 +97,14 @@ def lived(name: str, days: Days, gaps: Gaps) -> Verdict:
 
 
 @pytest.mark.parametrize("name", shipped_tasks())
-def test_a_good_day_succeeds(name: str) -> None:
-    assert lived(name, GOOD, GOOD_GAPS) is Verdict.SUCCEEDED
+def test_shipped_tasks_accept_a_good_run(name: str) -> None:
+    assert final_verdict(name, GOOD, GOOD_GAPS) is Verdict.SUCCEEDED
 
 
 @pytest.mark.parametrize("name", shipped_tasks())
-def test_a_bad_day_does_not(name: str) -> None:
-    wanted = {
+def test_shipped_tasks_refuse_a_bad_run(name: str) -> None:
+    expected = {
         "inspect": Verdict.INTERRUPTED,
         "dock_with_retry": Verdict.IN_PROGRESS,  # it may always try again
     }
-    assert lived(name, BAD, BAD_GAPS) is wanted.get(name, Verdict.FAILED)
+    assert final_verdict(name, BAD, BAD_GAPS) is expected.get(name, Verdict.FAILED)

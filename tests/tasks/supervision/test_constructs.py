@@ -49,7 +49,7 @@ def first(played: ScriptedRun, kind: str, stage: str) -> float:
     return next(e.time for e in played.events if e.kind == kind and e.data.get("stage") == stage)
 
 
-def test_a_stage_ends_when_its_file_says_so() -> None:
+def test_an_end_condition_ends_its_stage() -> None:
     text = (
         "<t> ::= <near> <far>\n"
         "<near> ::= converging(arm, satellite){}\n"
@@ -62,7 +62,7 @@ def test_a_stage_ends_when_its_file_says_so() -> None:
     assert first(ended, "stage_done", "near") == pytest.approx(5.0, abs=0.3)
 
 
-def test_a_stage_that_was_left_before_its_end_was_seen_has_failed() -> None:
+def test_a_stage_that_is_left_before_its_end_condition_has_failed() -> None:
     text = (
         "<t> ::= <near> <caught>\n"
         "<near> ::= converging(arm, satellite) ends when gone(arm)\n"
@@ -73,7 +73,7 @@ def test_a_stage_that_was_left_before_its_end_was_seen_has_failed() -> None:
     assert "ends when gone(arm)" in str([e.text for e in played.events])
 
 
-def test_a_stage_begins_when_its_file_says_so_and_not_before() -> None:
+def test_a_stage_does_not_begin_before_its_begin_condition() -> None:
     text = (
         "<t> ::= <near> <caught>\n"
         "<near> ::= converging(arm, satellite)\n"
@@ -87,7 +87,7 @@ def test_a_stage_begins_when_its_file_says_so_and_not_before() -> None:
     assert status(late, "caught") in (Status.PROGRESSING, Status.DONE)
 
 
-def test_nothing_counts_for_or_against_a_first_stage_before_it_begins() -> None:
+def test_evidence_before_a_first_stage_begins_is_ignored() -> None:
     text = "<t> ::= converging(arm, satellite) begins when touching(arm, satellite)"
     script = Script((RelationSpan("diverging", 0.0, 9.0), RelationSpan("touching", 12.0, 30.0)))
     assert status(watch(text, script, 11.0), "t") is Status.ACTIVE
@@ -125,7 +125,7 @@ def test_a_progress_condition_replaces_the_default_progress() -> None:
         ("not (coupled(arm, satellite) or not touching(arm, satellite))", True),
     ],
 )
-def test_conditions_survive_parsing(condition: str, true: bool) -> None:
+def test_boolean_conditions_are_evaluated_as_written(condition: str, true: bool) -> None:
     text = f"<t> ::= keeping_distance(arm, satellite)\nnever {condition}"
     script = Script(
         (RelationSpan("keeping_distance", 0.0, 30.0), RelationSpan("touching", 0.0, 30.0))
@@ -134,21 +134,21 @@ def test_conditions_survive_parsing(condition: str, true: bool) -> None:
     assert broken is true
 
 
-def test_what_must_never_be_of_one_body_fails_the_task_and_is_not_unsafe() -> None:
+def test_a_broken_invariant_about_one_object_fails_the_task_without_alarm() -> None:
     text = "<t> ::= <near>\n<near> ::= keeping_distance(arm, satellite) for 9 s\nnever present(satellite)"
     script = Script((RelationSpan("keeping_distance", 0.0, 30.0),))
-    found = watch(text, script, 5.0)
-    assert belief(found).verdict is Verdict.FAILED
-    assert status(found, "near") is Status.FAILED
+    played = watch(text, script, 5.0)
+    assert belief(played).verdict is Verdict.FAILED
+    assert status(played, "near") is Status.FAILED
 
 
-def test_a_condition_that_cannot_be_observed_breaks_nothing() -> None:
+def test_an_unobservable_condition_breaks_no_invariant() -> None:
     text = "<t> ::= keeping_distance(arm, satellite)\nnever not moving(boom)"
     script = Script((RelationSpan("keeping_distance", 0.0, 30.0),))
     assert belief(watch(ACTORS + text, script, 5.0)).verdict is Verdict.SUCCEEDED
 
 
-def test_an_invariant_waits_as_long_as_it_says_and_counts_in_its_stages_only() -> None:
+def test_an_invariant_has_a_duration_and_applies_only_during_its_stages() -> None:
     text = (
         "<t> ::= <first> <second>\n"
         "<first> ::= <near>\n"
@@ -183,7 +183,7 @@ def test_repetitions_are_counted() -> None:
 
 
 @pytest.mark.parametrize("order", [("touching", "converging"), ("converging", "touching")])
-def test_any_order_is_any_order_and_each_is_asked_for(order: tuple[str, str]) -> None:
+def test_any_order_accepts_every_order_and_requires_each_stage(order: tuple[str, str]) -> None:
     text = (
         "<t> ::= any order (<touch>, <near>) <caught>\n<touch> ::= touching(arm, satellite) for 1 s\n"
         "<near> ::= converging(arm, satellite) for 1 s\n<caught> ::= coupled(arm, satellite)"
@@ -202,7 +202,7 @@ def test_any_order_is_any_order_and_each_is_asked_for(order: tuple[str, str]) ->
     assert belief(watch(text, only, 15.0)).verdict is not Verdict.SUCCEEDED
 
 
-def test_what_is_asked_of_an_optional_actor_may_be_left_out() -> None:
+def test_stages_of_an_optional_actor_may_be_skipped() -> None:
     text = "<t> ::= <seen> <caught>\n<seen> ::= touching(arm, boom)\n<caught> ::= coupled(arm, satellite)"
     script = Script((MEETS, HOLDS))
     must = watch("actor boom is dish\n" + text, script, 15.0)
@@ -221,7 +221,7 @@ def test_what_is_asked_of_an_optional_actor_may_be_left_out() -> None:
     assert belief(watch("actor boom is dish\n" + text, crowded, 3.0)).unexplained == ()
 
 
-def moved(
+def watch_path(
     played_until: float, path: dict[float, tuple[float, float]], text: str, **mind: object
 ) -> Mind:
     """A task watched while the arm's centre and outline are where a path says, by time."""
@@ -255,24 +255,24 @@ def test_a_zone_is_entered_and_left(declared: str) -> None:
     )
     drawn = Zone("berth", ((100, 100), (200, 100), (200, 200), (100, 200)))
     path = {0.0: (20.0, 150.0), 3.0: (150.0, 150.0)}
-    there = moved(6.0, path, text, zones=(drawn,)).tasks[0]
-    assert there.stages[0].status is Status.DONE
-    gone = moved(9.0, {**path, 6.0: (198.5, 300.0)}, text, zones=(drawn,)).tasks[0]
-    assert gone.verdict is Verdict.SUCCEEDED
-    half = moved(9.0, {**path, 6.0: (198.5, 150.0)}, text, zones=(drawn,)).tasks[0]
-    assert half.verdict is Verdict.IN_PROGRESS
-    never = moved(6.0, {0.0: (20.0, 150.0)}, text, zones=(drawn,)).tasks[0]
+    inside = watch_path(6.0, path, text, zones=(drawn,)).tasks[0]
+    assert inside.stages[0].status is Status.DONE
+    outside = watch_path(9.0, {**path, 6.0: (198.5, 300.0)}, text, zones=(drawn,)).tasks[0]
+    assert outside.verdict is Verdict.SUCCEEDED
+    halfway = watch_path(9.0, {**path, 6.0: (198.5, 150.0)}, text, zones=(drawn,)).tasks[0]
+    assert halfway.verdict is Verdict.IN_PROGRESS
+    never = watch_path(6.0, {0.0: (20.0, 150.0)}, text, zones=(drawn,)).tasks[0]
     assert never.verdict is not Verdict.SUCCEEDED
 
 
-def test_words_and_quantities_of_rules_are_actions() -> None:
-    known = known_actions()
-    assert {"moving", "hidden", "gap", "time_to_contact", "disconnected"} <= set(known)
-    assert not {"expected", "stale", "healthy", "actor"} & set(known)
-    seen = belief(
+def test_predicates_and_quantities_of_rules_are_actions() -> None:
+    actions = known_actions()
+    assert {"moving", "hidden", "gap", "time_to_contact", "disconnected"} <= set(actions)
+    assert not {"expected", "stale", "healthy", "actor"} & set(actions)
+    final = belief(
         watch("<t> ::= seen(arm) for 2 s hidden(arm)", Script(hidden={ARM: (4.0, 30.0)}), 8.0)
     )
-    assert seen.verdict is Verdict.SUCCEEDED
+    assert final.verdict is Verdict.SUCCEEDED
     text = "parameter age is {}\n<t> ::= in_view(arm) > age"
     assert belief(watch(text.format("3 s"), Script(), 2.0)).verdict is not Verdict.SUCCEEDED
     played = watch(text.format("3 s"), Script(), 5.0)
@@ -305,14 +305,14 @@ def test_plug_ins_add_actions() -> None:
         with_actions(known_actions(), [replace(gripped, name="coupled")])
 
 
-TOLD = """<dock> ::= "The arm catches the satellite" <capture>
+NARRATED = """<dock> ::= "The arm catches the satellite" <capture>
 <capture> ::= "They come to each other" <near> <caught>
 <near> ::= "the arm closes in" converging(arm, satellite)
 <caught> ::= coupled(arm, satellite)"""
 
 
 def test_texts_of_a_file_are_reported_when_their_stages_begin() -> None:
-    played = watch(TOLD, Script((NEARS, MEETS, HOLDS)), 15.0)
+    played = watch(NARRATED, Script((NEARS, MEETS, HOLDS)), 15.0)
     started = [e.text for e in played.events if e.kind == "stage_started"]
     assert started[0].endswith(
         " The arm catches the satellite. They come to each other. The arm closes in."
@@ -320,7 +320,7 @@ def test_texts_of_a_file_are_reported_when_their_stages_begin() -> None:
     assert not any("closes in" in t or "each other" in t for t in started[1:])
 
 
-MANY = """task <dock> ::= <near> <caught>
+SEVERAL = """task <dock> ::= <near> <caught>
 task <meet> ::= <near> touching(arm, satellite)
 <near> ::= converging(arm, satellite)
 <caught> ::= coupled(arm, satellite)
@@ -328,9 +328,9 @@ never gone(satellite) during <caught>
 """
 
 
-def test_a_file_may_hold_several_tasks(tmp_path: Path) -> None:
+def test_a_file_can_contain_several_tasks(tmp_path: Path) -> None:
     file = tmp_path / "many.task"
-    file.write_text(MANY)
+    file.write_text(SEVERAL)
     dock, meet = load_tasks(file)
     assert (dock.name, meet.name) == ("dock", "meet")
     assert (len(dock.invariants), len(meet.invariants)) == (1, 0)
@@ -343,7 +343,7 @@ def test_a_file_may_hold_several_tasks(tmp_path: Path) -> None:
     assert [finish(t) for t in played.last.tasks] == [Verdict.IN_PROGRESS, Verdict.SUCCEEDED]
 
 
-def test_included_files_are_read_beside_their_file_and_faults_told_where_they_are(
+def test_includes_are_relative_and_errors_name_their_own_file(
     tmp_path: Path,
 ) -> None:
     (tmp_path / "parts").mkdir()

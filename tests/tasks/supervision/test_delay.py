@@ -32,7 +32,7 @@ def washed(clause: str, begins: float, text: str = WASH) -> ScriptedRun:
 
 @pytest.mark.parametrize("begins", [3.6, 5.0, 7.0, 9.0, 12.0, 14.0, 17.0])
 @pytest.mark.parametrize(
-    ("clause", "least", "most"),
+    ("clause", "min_s", "max_s"),
     [
         ("", 0.0, 1e9),
         ("after 5 s", 5.0, 1e9),
@@ -41,10 +41,10 @@ def washed(clause: str, begins: float, text: str = WASH) -> ScriptedRun:
     ],
 )
 def test_a_stage_begins_neither_sooner_nor_later_than_its_delay(
-    clause: str, least: float, most: float, begins: float
+    clause: str, min_s: float, max_s: float, begins: float
 ) -> None:
     verdict = finish(task_of(washed(clause, begins)))
-    assert (verdict is Verdict.SUCCEEDED) == (least <= begins - OVER_S <= most)
+    assert (verdict is Verdict.SUCCEEDED) == (min_s <= begins - OVER_S <= max_s)
 
 
 @pytest.mark.parametrize(("begins", "good"), [(3.0, False), (7.0, True), (13.0, False)])
@@ -61,7 +61,7 @@ def test_a_delay_of_the_first_stage_counts_from_the_beginning(begins: float, goo
 
 
 @pytest.mark.parametrize(
-    ("begins", "why"),
+    ("begins", "reason"),
     [
         (
             5.0,
@@ -70,11 +70,11 @@ def test_a_delay_of_the_first_stage_counts_from_the_beginning(begins: float, goo
         (17.0, "`rinse` should begin no later than 10 s after the stage before it, but did not"),
     ],
 )
-def test_the_reason_of_a_failure_is_reported(begins: float, why: str) -> None:
-    assert any(why in e.text for e in washed("after 5 s to 10 s", begins).events)
+def test_the_reason_of_a_failure_is_reported(begins: float, reason: str) -> None:
+    assert any(reason in e.text for e in washed("after 5 s to 10 s", begins).events)
 
 
-def test_what_goes_on_until_the_next_thing_is_over_when_it_was_last_seen() -> None:
+def test_a_delay_after_a_lasting_action_counts_from_its_last_observation() -> None:
     text = WASH.replace("touching(hose, car) for 2 s", "converging(hose, car)")
     for begins, good in ((6.0, False), (10.0, True)):
         spans = (

@@ -36,9 +36,9 @@ spans = st.lists(
 
 
 @given(spans)
-def test_a_coincidence_is_the_last_time_that_lies_in_all(found: list[tuple[int, int]]) -> None:
-    everywhere = [t for t in range(10) if all(a <= t <= b for a, b in found)]
-    assert coincidence(found) == max(everywhere, default=None)
+def test_a_coincidence_is_the_last_time_that_lies_in_all(intervals: list[tuple[int, int]]) -> None:
+    common = [t for t in range(10) if all(a <= t <= b for a, b in intervals)]
+    assert coincidence(intervals) == max(common, default=None)
 
 
 @given(st.lists(st.tuples(st.booleans(), st.booleans(), st.booleans()), min_size=1))
@@ -46,20 +46,20 @@ def test_steps_have_met_if_both_held_since_either_was_last_refuted(
     moments: list[tuple[bool, bool, bool]],
 ) -> None:
     first, second = (TaskStep(name, (), "s") for name in ("a", "b"))
-    found: tuple[StepEntries, Meetings] = ((), ())
-    for now, (one, other, refuted) in enumerate(moments):
-        true = {first: one and not refuted, second: other}
+    entries: tuple[StepEntries, Meetings] = ((), ())
+    for now, (first_holds, second_holds, refuted) in enumerate(moments):
+        true = {first: first_holds and not refuted, second: second_holds}
         entry = {s: Relation(s.action, (1,), Truth.TRUE, now) for s in true if true[s]}
         none = {first} if refuted else set[TaskStep]()
-        found = observed_entries(
-            found, [(first, second)], entry.get, now, refuted=none.__contains__
+        entries = observed_entries(
+            entries, [(first, second)], entry.get, now, refuted=none.__contains__
         )
-    anew = max((i for i, m in enumerate(moments) if m[2]), default=-1) + 1
-    together = any(a and b for a, b, _ in moments[anew:])
-    assert dict(found[1]).get((first, second), -1) == max(
-        (i for i, (a, b, _) in enumerate(moments) if i >= anew and a and b), default=-1
+    start = max((i for i, m in enumerate(moments) if m[2]), default=-1) + 1
+    together = any(a and b for a, b, _ in moments[start:])
+    assert dict(entries[1]).get((first, second), -1) == max(
+        (i for i, (a, b, _) in enumerate(moments) if i >= start and a and b), default=-1
     )
-    assert bool(found[1]) == together
+    assert bool(entries[1]) == together
 
 
 def test_nothing_coincides_with_nothing() -> None:
@@ -69,33 +69,33 @@ def test_nothing_coincides_with_nothing() -> None:
 def stages(text: str, spans: tuple[RelationSpan, ...], seconds: float) -> dict[str, set[Status]]:
     """All statuses that each stage was believed to have."""
     played = play(task_reasoner([parse_task(text)]), Script(spans), seconds)
-    found: dict[str, set[Status]] = {}
+    statuses: dict[str, set[Status]] = {}
     for mind in played.minds:
         for stage in mind.tasks[0].stages:
-            found.setdefault(stage.stage, set()).add(stage.status)
-    return found
+            statuses.setdefault(stage.stage, set()).add(stage.status)
+    return statuses
 
 
 @pytest.mark.parametrize("text", [CARRY, APPROACHED])
-def test_what_turns_back_before_the_next_stage_fails_in_the_stage_that_lasts(text: str) -> None:
+def test_turning_back_before_the_next_stage_fails_the_current_one(text: str) -> None:
     turns = (RelationSpan("converging", 0.5, 5.0), RelationSpan("diverging", 5.5, 12.0))
-    found = stages(text, turns, 10.0)
-    lasting = "carry" if "carry" in found else "near"
-    assert Status.FAILING in found[lasting]
-    assert found["place"] == {Status.PENDING}
+    statuses = stages(text, turns, 10.0)
+    lasting = "carry" if "carry" in statuses else "near"
+    assert Status.FAILING in statuses[lasting]
+    assert statuses["place"] == {Status.PENDING}
 
 
 @pytest.mark.parametrize(("coupled_until", "done"), [(5.5, True), (5.1, True), (2.0, False)])
-def test_one_entry_may_be_doubted_when_another_is_confirmed(
+def test_a_stage_begins_though_one_step_is_doubted_while_the_other_is_confirmed(
     coupled_until: float, done: bool
 ) -> None:
-    told = (
+    relation_spans = (
         RelationSpan("converging", 0.5, 5.0),
         RelationSpan("coupled", 1.0, coupled_until),
         RelationSpan("touching", 4.9, 9.0),
     )
-    found = stages(CARRY, told, 8.0)
-    assert (Status.DONE in found["place"]) is done
+    statuses = stages(CARRY, relation_spans, 8.0)
+    assert (Status.DONE in statuses["place"]) is done
 
 
 PUT = """actor arm is arm
@@ -110,12 +110,12 @@ actor dish is dish
 
 
 @pytest.mark.parametrize(("coupled_until", "done"), [(5.0, True), (4.6, False)])
-def test_what_held_until_the_other_was_confirmed_has_held_with_it(
+def test_a_step_that_held_until_the_other_was_confirmed_counts_as_concurrent(
     coupled_until: float, done: bool
 ) -> None:
     """A gripper opens as it sets a part down: its hold is in doubt before the contact is confirmed."""
     hold, meeting = (ARM, SATELLITE), (SATELLITE, INTRUDER)
-    told = (
+    relation_spans = (
         RelationSpan("moving_together", 1.0, 4.95, hold),
         RelationSpan("converging", 2.5, 4.7, meeting),
         RelationSpan("touching", 4.9, 12.0, meeting),
@@ -124,7 +124,7 @@ def test_what_held_until_the_other_was_confirmed_has_held_with_it(
         RelationSpan("coupled", coupled_until, 5.1, hold, truth=Truth.UNKNOWN),
         RelationSpan("diverging", 5.3, 12.0, hold),
     )
-    script = Script(told, dict.fromkeys((ARM, SATELLITE, INTRUDER), (0.0, 1000000000.0)))
+    script = Script(relation_spans, dict.fromkeys((ARM, SATELLITE, INTRUDER), (0.0, 1000000000.0)))
     played = play(task_reasoner([parse_task(PUT)]), script, 10.0, fps=10.0)
     fails = [
         m.time
@@ -140,7 +140,7 @@ HOLD = Relation("opened", (1,), Truth.TRUE, 1.0)
 
 
 @pytest.mark.parametrize(
-    ("held_at", "holding", "found"),
+    ("held_at", "holding", "expected"),
     [
         (2.0, {CLOSED}, {OPENED: HOLD}),
         (1.4, {CLOSED}, {}),
@@ -148,19 +148,19 @@ HOLD = Relation("opened", (1,), Truth.TRUE, 1.0)
         (2.0, {OPENED, CLOSED}, {}),
     ],
 )
-def test_a_step_held_on_entry_if_it_did_when_the_other_began_which_holds_now(
-    held_at: float, holding: set[TaskStep], found: dict[TaskStep, Relation]
+def test_a_step_held_on_entry_if_it_held_when_the_other_one_began(
+    held_at: float, holding: set[TaskStep], expected: dict[TaskStep, Relation]
 ) -> None:
-    told = {OPENED: StepEntry(1.0, 2.0, HOLD, held_at), CLOSED: StepEntry(1.5, 2.2)}
-    entries = tuple(told.items())
-    assert held_on_entry(entries, (OPENED, CLOSED), holding.__contains__) == found
+    by_step = {OPENED: StepEntry(1.0, 2.0, HOLD, held_at), CLOSED: StepEntry(1.5, 2.2)}
+    entries = tuple(by_step.items())
+    assert held_on_entry(entries, (OPENED, CLOSED), holding.__contains__) == expected
     assert held_on_entry(entries[:1], (OPENED, CLOSED), holding.__contains__) == {}
 
 
 def test_an_entry_remembers_when_the_step_last_held() -> None:
     near = {OPENED: Relation("near", (1,), Truth.TRUE, 0.0)}
-    found: tuple[StepEntries, Meetings] = ((), ())
+    entries: tuple[StepEntries, Meetings] = ((), ())
     for now, holds in enumerate([False, True, True, False]):
-        held = {OPENED: HOLD} if holds else {}
-        found = observed_entries(found, [(OPENED,)], near.get, now, held_by=held.get)
-    assert dict(found[0])[OPENED] == StepEntry(0.0, 3, HOLD, 2)
+        holding = {OPENED: HOLD} if holds else {}
+        entries = observed_entries(entries, [(OPENED,)], near.get, now, held_by=holding.get)
+    assert dict(entries[0])[OPENED] == StepEntry(0.0, 3, HOLD, 2)

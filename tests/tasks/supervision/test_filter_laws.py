@@ -1,4 +1,4 @@
-"""Supervision tells what the certified filter tells, on what was recorded, within a stated bound."""
+"""Supervision agrees with the certified filter on recorded observations, within a stated bound."""
 
 from __future__ import annotations
 
@@ -49,19 +49,19 @@ MIXED = (
 
 
 def model_of(task: Task) -> MonitoredPhases:
-    words = task_vocabulary(task, known_actions())
-    return MonitoredPhases(task, words.meanings, DEFAULT_SETTINGS, words.evaluators)
+    vocabulary = task_vocabulary(task, known_actions())
+    return MonitoredPhases(task, vocabulary.meanings, DEFAULT_SETTINGS, vocabulary.evaluators)
 
 
 def recorded(model: MonitoredPhases, minds: Sequence[Mind]) -> Recorded:
     """What supervision saw of the steps of its task, from where the task begins."""
     followed = [m for m in minds if m.memory["tasks"][0].posterior is not None]
-    found = []
+    observations = []
     for mind in followed:
         memory = mind.memory["tasks"][0]
         scene = TaskSnapshot(mind, memory.belief.bindings, model, memory.observations)
-        found.append((mind.time, scene.observe))
-    return found
+        observations.append((mind.time, scene.observe))
+    return observations
 
 
 @pytest.mark.parametrize(
@@ -73,32 +73,32 @@ def recorded(model: MonitoredPhases, minds: Sequence[Mind]) -> Recorded:
         (parse_task(ORDERS), MIXED),
     ],
 )
-def test_on_scripted_scenes_supervision_is_within_its_bound(
+def test_supervision_is_within_its_error_bound_on_scripted_scenes(
     task: Task, spans: tuple[RelationSpan, ...]
 ) -> None:
     played = play(task_reasoner([task]), Script(spans), 28.0)
     model = model_of(task)
-    found = distance_to_certified(model, recorded(model, played.minds))
-    assert found.lost < 1e-6
-    assert found.worst <= BOUND
+    distance = distance_to_certified(model, recorded(model, played.minds))
+    assert distance.lost < 1e-6
+    assert distance.worst <= BOUND
 
 
 @pytest.mark.skipif(
     not (MISSIONS / NAMES[0]).exists(), reason="the shared missions are not beside the repo"
 )
 @pytest.mark.parametrize("name", NAMES)
-def test_on_the_missions_supervision_is_within_its_bound(name: str) -> None:
+def test_supervision_is_within_its_error_bound_on_missions(name: str) -> None:
     model = model_of(load_task("dock"))
-    found = distance_to_certified(model, recorded(model, run(name).minds))
-    assert found.lost < 1e-6
-    assert found.worst <= BOUND
+    distance = distance_to_certified(model, recorded(model, run(name).minds))
+    assert distance.lost < 1e-6
+    assert distance.worst <= BOUND
 
 
-def test_where_nothing_is_merged_the_two_are_the_same() -> None:
-    found = [drawn_distance(seed) for seed in (0, 2, 3, 5)]
-    assert max(d.worst for d in found) < 1e-9
+def test_without_merging_both_filters_agree() -> None:
+    distances = [drawn_distance(seed) for seed in (0, 2, 3, 5)]
+    assert max(d.worst for d in distances) < 1e-9
 
 
-def test_where_monitors_differ_at_a_node_merging_costs_something() -> None:
+def test_merging_different_monitors_causes_an_error() -> None:
     """The law can fail: random observations that follow no course make merging tell."""
     assert drawn_distance(9, steps=16).worst > BOUND  # the reference has few hypotheses until then

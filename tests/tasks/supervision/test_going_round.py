@@ -28,9 +28,7 @@ def brought(now: float, slant: bool) -> Mask:
 
 
 @pytest.mark.parametrize("slant", [False, True])
-def test_what_rests_on_another_does_not_hold_up_who_comes_across(
-    tmp_path: Path, slant: bool
-) -> None:
+def test_objects_at_rest_do_not_delay_the_approach_of_another(tmp_path: Path, slant: bool) -> None:
     roles = {"base": BASE, "block": BLOCK, "cap": CAP}
     events = watched(tmp_path, LID, lambda now: brought(now, slant), roles, 7.0)
     begun = first(events, "stage_started", "bring")

@@ -124,7 +124,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_verdicts_of_the_language(name: str) -> None:
+def test_each_construct_gives_the_expected_verdict(name: str) -> None:
     text, script, verdict = CASES[name]
     until = max(s.to_s for s in script.spans)
     assert finish(task_of(watch(script, until, text))) is verdict
@@ -145,14 +145,14 @@ LEAVES = {ARM: (0.0, 6.0), SATELLITE: (0.0, 1e9)}
 
 
 @pytest.mark.parametrize("must", ["never touching(arm, satellite)", "always present(arm)"])
-def test_a_broken_invariant_is_told_once_with_what_the_task_comes_to(must: str) -> None:
+def test_a_broken_invariant_is_reported_once_with_the_verdict(must: str) -> None:
     text = f"<t> ::= converging(arm, satellite) keeping_distance(arm, satellite) for 3 s\n{must}"
     script = spans(("converging", 0, 5), ("keeping_distance", 5, 12), ("touching", 6, 9))
     script = replace(script, objects=LEAVES) if "present" in must else script
     played = watch(script, 12.0, text)
-    told = [e for step in played.outcomes for e in worded_once(step.events)]
-    grave = [e.text for e in told if e.severity > Severity.INFO]
-    assert len(grave) == 1
-    assert grave[0].startswith("Task `t` ")
+    lines = [e for step in played.outcomes for e in worded_once(step.events)]
+    severe = [e.text for e in lines if e.severity > Severity.INFO]
+    assert len(severe) == 1
+    assert severe[0].startswith("Task `t` ")
     causes = {c.cause for step in played.outcomes for c in step.conditions}
-    assert causes == set(grave)
+    assert causes == set(severe)

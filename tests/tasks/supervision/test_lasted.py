@@ -22,11 +22,11 @@ tenths = st.integers(10, 90).map(lambda n: n / 10)
 
 @settings(max_examples=15)
 @given(st.lists(st.tuples(tenths, tenths), max_size=3))
-def test_alone_it_says_what_the_stage_condition_says(spans: list[tuple[float, float]]) -> None:
-    script = Script([RelationSpan("touching", at, at + lasts) for at, lasts in spans])
+def test_a_duration_alone_equals_that_of_the_stage(spans: list[tuple[float, float]]) -> None:
+    script = Script([RelationSpan("touching", start, start + lasts) for start, lasts in spans])
     texts = ("touching(arm, satellite) for 2 s", "(touching(arm, satellite) for 2 s)")
-    one, other = (task_of(watch(script, 12.0, DOCK.format(t), fps=5.0)) for t in texts)
-    assert (one.verdict, one.confidence) == (other.verdict, other.confidence)
+    separate, nested = (task_of(watch(script, 12.0, DOCK.format(t), fps=5.0)) for t in texts)
+    assert (separate.verdict, separate.confidence) == (nested.verdict, nested.confidence)
 
 
 @pytest.mark.parametrize(
@@ -38,7 +38,7 @@ def test_alone_it_says_what_the_stage_condition_says(spans: list[tuple[float, fl
         ("(coupled(arm, satellite) for 4 s) or (touching(arm, satellite) for 2 s)", True),
     ],
 )
-def test_it_may_stand_among_others(condition: str, good: bool) -> None:
+def test_a_duration_can_be_part_of_a_condition(condition: str, good: bool) -> None:
     script = Script(
         [
             RelationSpan("converging", 0.5, 3.0),
@@ -50,15 +50,13 @@ def test_it_may_stand_among_others(condition: str, good: bool) -> None:
     assert (finish(task_of(played)) is Verdict.SUCCEEDED) == good
 
 
-def test_it_reads_back() -> None:
+def test_a_duration_in_a_condition_is_printed_and_parsed_back() -> None:
     text = DOCK.format("not (touching(a, b) and seen(a) for 2 s) or (seen(b) for wait)")
     assert str(read(text)) == text
 
 
 @given(st.integers(0, 6), st.integers(2, 20))
-def test_it_counts_from_when_it_began_to_hold_however_late_that_is_seen(
-    late: int, lasts: int
-) -> None:
+def test_a_duration_counts_from_its_onset_even_if_confirmed_late(late: int, lasts: int) -> None:
     """The two meet at 2.9 s; that they are coupled is doubtful at first; then one leaves the picture."""
     until = 3.0 + lasts / 10
     script = Script(
@@ -70,13 +68,13 @@ def test_it_counts_from_when_it_began_to_hold_however_late_that_is_seen(
         ],
         objects={ARM: (0.0, until), SATELLITE: (0.0, 1e9)},
     )
-    held = finish(task_of(watch(script, 7.0, HOLD))) is Verdict.SUCCEEDED
+    succeeded = finish(task_of(watch(script, 7.0, HOLD))) is Verdict.SUCCEEDED
     # The frame in which it begins and the one in which it leaves may count or not.
-    assert held if lasts >= 13 else not held or lasts > 10
+    assert succeeded if lasts >= 13 else not succeeded or lasts > 10
 
 
 @pytest.mark.parametrize(("hidden", "good"), [((9.0, 9.1), True), ((3.5, 4.4), False)])
-def test_what_cannot_be_seen_does_not_count(hidden: tuple[float, float], good: bool) -> None:
+def test_unobserved_time_does_not_count(hidden: tuple[float, float], good: bool) -> None:
     script = Script(
         [
             RelationSpan("converging", 0.5, 2.9),
@@ -90,7 +88,7 @@ def test_what_cannot_be_seen_does_not_count(hidden: tuple[float, float], good: b
 
 
 @pytest.mark.parametrize(("until", "good"), [(3.2, False), (3.8, True)])
-def test_what_held_before_the_stage_began_does_not_count(until: float, good: bool) -> None:
+def test_time_before_the_stage_does_not_count(until: float, good: bool) -> None:
     """Both hold from 0.5 s on; the first stage takes until 2.5 s, so the second one until 3.5 s."""
     text = """
     <t>    ::= <meet> <hold>

@@ -1,4 +1,4 @@
-"""What is told of a task is as likely as all hypotheses together by which it is so."""
+"""Reported beliefs are marginals: as likely as all hypotheses that agree with them."""
 
 from __future__ import annotations
 
@@ -62,8 +62,8 @@ def test_done_stages_are_reported_in_any_order(
     count = len(of)
     played = followed(count, relation, relation, lasts_s, of)
     for k, stage in enumerate(of, 1):
-        told = {s.stage: s for s in belief(played, EVERY_S * k + 0.5).stages}
-        done, pending = told[f"s{stage}"], [told[f"s{i}"] for i in of[k:]]
+        stages = {s.stage: s for s in belief(played, EVERY_S * k + 0.5).stages}
+        done, pending = stages[f"s{stage}"], [stages[f"s{i}"] for i in of[k:]]
         assert done.status is Status.DONE
         assert done.confidence > 0.75
         assert not [s for s in pending if s.status in (Status.DONE, Status.PROGRESSING)]
@@ -73,13 +73,13 @@ def test_done_stages_are_reported_in_any_order(
     assert [s.status for s in last.stages] == [Status.DONE] * count
 
 
-def test_the_confidence_in_a_stage_is_the_mass_of_all_orders_in_which_it_is_done() -> None:
+def test_the_confidence_in_a_done_stage_is_the_mass_of_all_orders() -> None:
     played = followed(3, "touching", "touching", 2.0, (0, 1, 2))
     for mind in played.minds[12:]:
         weighted = mind.memory["tasks"][0].posterior.hypotheses.values()
         for stage in mind.tasks[0].stages:
             if stage.status is Status.DONE:
-                alike = [
+                masses = [
                     w.mass
                     for w in weighted
                     if any(
@@ -87,16 +87,16 @@ def test_the_confidence_in_a_stage_is_the_mass_of_all_orders_in_which_it_is_done
                     )
                     or w.value.finished is not None
                 ]
-                assert stage.confidence == pytest.approx(sum(alike), abs=1e-6)
+                assert stage.confidence == pytest.approx(sum(masses), abs=1e-6)
 
 
-def test_before_anything_is_seen_no_stage_of_several_is_told_to_have_begun() -> None:
+def test_without_observations_no_stage_is_reported_as_begun() -> None:
     quiet = replace(script(3, "touching", 2.0, (0, 1, 2)), spans=())
     played = play(task_reasoner([parse_task(any_order(3, "touching"))]), quiet, 3.0)
-    told = played.last.tasks[0]
-    assert {s.status for s in told.stages} == {Status.PENDING}
-    assert told.verdict is Verdict.UNKNOWN
-    assert told.confidence == pytest.approx(1 / 3)
+    task = played.last.tasks[0]
+    assert {s.status for s in task.stages} == {Status.PENDING}
+    assert task.verdict is Verdict.UNKNOWN
+    assert task.confidence == pytest.approx(1 / 3)
     assert played.events == ()
 
 
@@ -112,7 +112,7 @@ def test_a_false_alarm_counts_once_however_long_it_lasts() -> None:
     assert belief(played, 11.0).current == "near"
 
 
-def test_what_contradicts_two_actions_of_a_stage_counts_once() -> None:
+def test_evidence_against_two_actions_of_a_stage_counts_once() -> None:
     """A tug that leaves without its cart fails to haul it: it has not failed to approach it."""
     text = (
         "<fetch> ::= <approach> <meet> <haul>\n<approach> ::= converging(arm, satellite)\n"

@@ -45,48 +45,53 @@ def run(name: str) -> Run:
     events: list[Event] = []
     alerts: list[AlertCondition] = []
     minds: list[Mind] = []
-    for seen, _ in observations(name, Noise(every=3)):
+    for observation, _ in observations(name, Noise(every=3)):
         mind = replace(
-            mind, time=seen.time, frame_index=seen.frame_index, frame_size=seen.frame_size
+            mind,
+            time=observation.time,
+            frame_index=observation.frame_index,
+            frame_size=observation.frame_size,
         )
-        concerns: list[AlertCondition] = []
+        conditions: list[AlertCondition] = []
         for reasoner in chain:
-            outcome = reasoner(mind, seen)
+            outcome = reasoner(mind, observation)
             mind = outcome.mind
             events += outcome.events
-            concerns += outcome.conditions
+            conditions += outcome.conditions
         open_now = {(a.kind, a.objects, a.key) for a in mind.alerts}
-        alerts += [c for c in concerns if (c.kind, c.objects, c.key) not in open_now]
-        mind = replace(mind, alerts=tuple(_alert(c, seen.time) for c in concerns))
-        beliefs.append((seen.time, mind.tasks[0]))
+        alerts += [c for c in conditions if (c.kind, c.objects, c.key) not in open_now]
+        mind = replace(mind, alerts=tuple(_alert(c, observation.time) for c in conditions))
+        beliefs.append((observation.time, mind.tasks[0]))
         minds.append(mind)
     return Run(tuple(beliefs), tuple(events), tuple(alerts), tuple(minds))
 
 
-def _alert(concern: AlertCondition, now: float) -> Alert:
-    c = concern
+def _alert(condition: AlertCondition, now: float) -> Alert:
+    c = condition
     return Alert(1, c.kind, c.severity, now, now, c.objects, c.cause, key=c.key)
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_verdict_is_right(name: str) -> None:
+def test_the_verdict_is_correct(name: str) -> None:
     assert finish(run(name).beliefs[-1][1]) is Verdict(truth_of(name)["verdict"])
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_stage_and_outcome_are_right_nearly_all_the_time(name: str) -> None:
+def test_stage_and_outcome_are_correct_in_most_frames(name: str) -> None:
     truth = truth_of(name)
     right = [
-        _stage_and_outcome(belief) == wanted
+        _stage_and_outcome(belief) == expected
         for time, belief in run(name).beliefs
-        if (wanted := _wanted(truth, time)) is not None
+        if (expected := _true_stage_and_outcome(truth, time)) is not None
     ]
     # What the border cuts may be a part of something known: of a stranger that comes in it is told a
     # moment later, when it is whole.
     assert sum(right) >= 0.88 * len(right)
 
 
-def _wanted(truth: dict[str, list[dict[str, object]]], time: float) -> tuple[str, str] | None:
+def _true_stage_and_outcome(
+    truth: dict[str, list[dict[str, object]]], time: float
+) -> tuple[str, str] | None:
     """The true stage and outcome so far, or None within a second of a change."""
     opened = [float(str(a["from_s"])) for a in truth["alerts"]]
     for stage in truth["stages"]:
@@ -110,30 +115,32 @@ def _stage_and_outcome(belief: TaskBelief) -> tuple[str, str]:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_failing_stage_is_reported_soon(name: str) -> None:
-    wanted = [a["from_s"] for a in truth_of(name)["alerts"] if a["kind"] == "stage_failing"]
-    told = [e.time for e in run(name).events if e.kind == "stage_failing"]
-    if wanted:
-        assert -0.5 <= told[0] - wanted[0] <= 2.0
+    expected = [a["from_s"] for a in truth_of(name)["alerts"] if a["kind"] == "stage_failing"]
+    reported = [e.time for e in run(name).events if e.kind == "stage_failing"]
+    if expected:
+        assert -0.5 <= reported[0] - expected[0] <= 2.0
     else:
         assert not [e for e in run(name).events if e.kind == "stage_failing" and e.severity]
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_no_alert_is_false(name: str) -> None:
+def test_there_are_no_false_alerts(name: str) -> None:
     expected = {a["kind"] for a in truth_of(name)["alerts"]}
     warned = {c.kind for c in run(name).alerts if c.severity >= Severity.WARNING}
     assert warned <= expected
 
 
 def test_the_narrative_is_that_of_the_paper() -> None:
-    told = [e.text for e in run("capture_fails").events if e.kind.startswith(("stage", "verdict"))]
-    assert told[0] == (
+    reported = [
+        e.text for e in run("capture_fails").events if e.kind.startswith(("stage", "verdict"))
+    ]
+    assert reported[0] == (
         "Stage `approach` of task `dock` has begun, with object 1, believed to be the arm, "
         "and object 2, believed to be the satellite."
     )
-    assert told[1].startswith("Stage `approach` is progressing satisfactorily: ")
-    assert told[2].startswith("Stage `approach` is complete")
-    assert told[3].startswith("Stage `captured` of task `dock` has begun")
-    failing = next(t for t in told if t.startswith("Stage `captured` is failing: "))
+    assert reported[1].startswith("Stage `approach` is progressing satisfactorily: ")
+    assert reported[2].startswith("Stage `approach` is complete")
+    assert reported[3].startswith("Stage `captured` of task `dock` has begun")
+    failing = next(t for t in reported if t.startswith("Stage `captured` is failing: "))
     assert failing.endswith("s; stage `captured` requires them to be coupled.")
-    assert told[-1].startswith("Task `dock` has failed: ")
+    assert reported[-1].startswith("Task `dock` has failed: ")

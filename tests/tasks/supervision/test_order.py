@@ -16,14 +16,14 @@ from visup.tasks.verification.observe import RelationLookup
 
 TOP, LEGS = 1, (2, 3, 4)
 NAMES = {TOP: {"top": 0.9}, **{k: {f"leg_{n}": 0.9} for n, k in enumerate(LEGS, 1)}}
-HERE = dict.fromkeys(NAMES, (0.0, 1e9))
+PRESENT = dict.fromkeys(NAMES, (0.0, 1e9))
 TWO = "<t> ::= <a> <b>\n<a> ::= touching(leg_1, top)\n<b> ::= {}touching(leg_2, top)"
 
 
 def scene(*meetings: tuple[int, float]) -> Script:
     """Legs that meet the top, each from a time on; `(3, 5.0)`: the second leg from 5 s."""
     spans = tuple(RelationSpan("touching", since, 1e9, (TOP, leg)) for leg, since in meetings)
-    return Script(spans, objects=HERE, identities=NAMES)
+    return Script(spans, objects=PRESENT, identities=NAMES)
 
 
 def watched(text: str, script: Script, until: float = 30.0) -> ScriptedRun:
@@ -34,16 +34,16 @@ def verdict(text: str, script: Script, until: float = 30.0) -> Verdict:
     return finish(task_of(watched(text, script, until)))
 
 
-def test_what_is_assembled_in_its_order_succeeds() -> None:
+def test_assembly_in_the_required_order_succeeds() -> None:
     assert verdict(TWO.format(""), scene((2, 3.0), (3, 8.0))) is Verdict.SUCCEEDED
 
 
 @pytest.mark.parametrize("since", [0.0, 2.0, 6.0])
-def test_what_was_so_before_its_turn_is_not_done_in_it(since: float) -> None:
+def test_an_action_that_held_before_its_stage_does_not_complete_it(since: float) -> None:
     played = watched(TWO.format(""), scene((2, 10.0), (3, since)))
     assert finish(task_of(played)) is Verdict.FAILED
-    (told,) = (s for s in task_of(played).stages if s.stage == "b")
-    assert told.status in (Status.FAILING, Status.FAILED)
+    (stage_b,) = (s for s in task_of(played).stages if s.stage == "b")
+    assert stage_b.status in (Status.FAILING, Status.FAILED)
     assert any("before stage `b` began" in e.text for e in played.events)
 
 
@@ -53,7 +53,7 @@ THREE = (
 )
 
 
-def told_early(played: ScriptedRun, since: float) -> list[str]:
+def early_failures(played: ScriptedRun, since: float) -> list[str]:
     """The stages that are told to fail within 4 s since a later one was done."""
     events = (e for e in played.events if e.kind == "stage_failing" and e.time < since + 4.0)
     return [str(e.data["stage"]) for e in events if "before the turn of" in e.text]
@@ -61,44 +61,49 @@ def told_early(played: ScriptedRun, since: float) -> list[str]:
 
 def test_a_step_out_of_order_is_reported_at_once() -> None:
     played = watched(THREE.format("", ""), scene((4, 4.0)), 12.0)
-    assert told_early(played, 4.0) == ["a"]
+    assert early_failures(played, 4.0) == ["a"]
     assert finish(task_of(played)) is Verdict.FAILED
-    (told,) = (e.text for e in played.events if e.kind == "stage_failing")
-    assert "`c`" in told
-    assert "stage `a` must be done first" in told
+    (text,) = (e.text for e in played.events if e.kind == "stage_failing")
+    assert "`c`" in text
+    assert "stage `a` must be done first" in text
 
 
 @pytest.mark.parametrize(
-    ("extra", "here"),
+    ("extra", "present"),
     [
-        (("", "already "), HERE),  # it may have been so before
-        (("", ""), {k: v for k, v in HERE.items() if k != LEGS[0]}),  # nobody knows about the first
+        (("", "already "), PRESENT),  # it may have been so before
+        (
+            ("", ""),
+            {k: v for k, v in PRESENT.items() if k != LEGS[0]},
+        ),  # nobody knows about the first
     ],
 )
 def test_uncertain_steps_are_not_reported_as_out_of_order(
-    extra: tuple[str, str], here: dict[int, tuple[float, float]]
+    extra: tuple[str, str], present: dict[int, tuple[float, float]]
 ) -> None:
-    script = replace(scene((4, 4.0)), objects=here)
-    assert told_early(watched(THREE.format(*extra), script, 12.0), 4.0) == []
+    script = replace(scene((4, 4.0)), objects=present)
+    assert early_failures(watched(THREE.format(*extra), script, 12.0), 4.0) == []
 
 
-@pytest.mark.parametrize(("until", "told"), [(5.5, False), (8.0, True)])
-def test_what_is_undone_is_done_again_in_its_turn(until: float, told: bool) -> None:
+@pytest.mark.parametrize(("until", "reported"), [(5.5, False), (8.0, True)])
+def test_an_early_step_that_is_undone_can_be_repeated_in_its_turn(
+    until: float, reported: bool
+) -> None:
     spans = (
         RelationSpan("touching", 4.0, until, (TOP, 4)),
         RelationSpan("touching", 10.0, 1e9, (TOP, 2)),
         RelationSpan("touching", 14.0, 1e9, (TOP, 3)),
         RelationSpan("touching", 18.0, 1e9, (TOP, 4)),
     )
-    played = watched(THREE.format("", ""), Script(spans, objects=HERE, identities=NAMES))
-    assert bool(told_early(played, 4.0)) is told
+    played = watched(THREE.format("", ""), Script(spans, objects=PRESENT, identities=NAMES))
+    assert bool(early_failures(played, 4.0)) is reported
     assert finish(task_of(played)) is Verdict.SUCCEEDED
 
 
-def test_what_is_not_undone_stays_out_of_order_though_the_rest_is_done() -> None:
+def test_an_early_step_that_is_not_undone_stays_out_of_order() -> None:
     played = watched(THREE.format("", ""), scene((4, 4.0), (2, 10.0), (3, 14.0)))
     assert finish(task_of(played)) is Verdict.FAILED
-    assert told_early(played, 4.0) == ["a"]
+    assert early_failures(played, 4.0) == ["a"]
     # Nor does it help that what was lacking is done by and by.
     before = watched(THREE.format("", ""), scene((4, 4.0), (2, 10.0), (3, 14.0)), 16.0)
     assert finish(task_of(before)) is Verdict.FAILED
@@ -114,37 +119,38 @@ def test_what_is_not_undone_stays_out_of_order_though_the_rest_is_done() -> None
         ("coupled(leg_1, top)", (RelationSpan("coupled", 6.0, 1e9, (TOP, 2)),)),
     ],
 )
-def test_what_is_no_work_or_goes_on_is_not_out_of_order(
+def test_initial_states_and_continuing_actions_are_not_out_of_order(
     last: str, spans: tuple[RelationSpan, ...]
 ) -> None:
     text = THREE.format("", "").replace("touching(leg_3, top)", last)
     spans += (RelationSpan("touching", 2.0, 1e9, (TOP, 2)),) if "coupled" in last else ()
-    played = watched(text, Script(spans, objects=HERE, identities=NAMES), 12.0)
+    played = watched(text, Script(spans, objects=PRESENT, identities=NAMES), 12.0)
     assert not any("before the turn of" in e.text for e in played.events)
 
 
-def test_what_was_so_when_the_task_began_is_no_work_of_the_task() -> None:
-    assert told_early(watched(THREE.format("", ""), scene((4, 0.0)), 12.0), 0.0) == []
+def test_a_relation_that_held_from_the_start_is_not_out_of_order() -> None:
+    assert early_failures(watched(THREE.format("", ""), scene((4, 0.0)), 12.0), 0.0) == []
 
 
 @pytest.mark.parametrize("since", [0.0, 2.0, 6.0])
-def test_already_takes_what_was_so_before(since: float) -> None:
+def test_already_accepts_an_action_that_held_before(since: float) -> None:
     assert verdict(TWO.format("already "), scene((2, 10.0), (3, since))) is Verdict.SUCCEEDED
 
 
-def test_what_ceases_and_becomes_so_again_is_done_in_its_turn() -> None:
+def test_a_relation_that_ends_and_holds_again_completes_its_stage() -> None:
     spans = (
         RelationSpan("touching", 10.0, 1e9, (TOP, 2)),
         RelationSpan("touching", 2.0, 12.0, (TOP, 3)),
         RelationSpan("touching", 18.0, 1e9, (TOP, 3)),
     )
     assert (
-        verdict(TWO.format(""), Script(spans, objects=HERE, identities=NAMES)) is Verdict.SUCCEEDED
+        verdict(TWO.format(""), Script(spans, objects=PRESENT, identities=NAMES))
+        is Verdict.SUCCEEDED
     )
 
 
 @pytest.mark.parametrize("order", list(permutations(LEGS)))
-def test_any_order_of_three_is_any_order(order: tuple[int, ...]) -> None:
+def test_every_order_of_three_stages_succeeds(order: tuple[int, ...]) -> None:
     text = "<t> ::= any order (<a>, <b>, <c>)\n" + "\n".join(
         f"<{n}> ::= touching(leg_{k}, top)" for k, n in enumerate("abc", 1)
     )
@@ -160,7 +166,7 @@ def test_any_order_of_three_is_any_order(order: tuple[int, ...]) -> None:
     ("legs", "expected"),
     [((2, 3), Verdict.SUCCEEDED), ((4, 2), Verdict.SUCCEEDED), ((3,), Verdict.IN_PROGRESS)],
 )
-def test_any_two_of_three(legs: tuple[int, ...], expected: Verdict) -> None:
+def test_any_two_of_three_contacts_suffice(legs: tuple[int, ...], expected: Verdict) -> None:
     text = "<t> ::= any 2 of (touching(leg_1, top), touching(leg_2, top), touching(leg_3, top))"
     assert verdict(text, scene(*((leg, 4.0 + 5.0 * k) for k, leg in enumerate(legs)))) is expected
 
@@ -176,7 +182,7 @@ def test_a_stage_with_an_actor_as_parameter_is_one_stage_for_each() -> None:
     assert names == {"mount(leg_1)", "mount(leg_2)", "mount(leg_3)"}
 
 
-def test_a_failure_may_be_recovered_from_where_a_way_out_is_said() -> None:
+def test_a_declared_recovery_follows_a_failure() -> None:
     text = (
         "<t> ::= <reach> <grasp>\n<reach> ::= converging(leg_1, top)\n"
         "<grasp> ::= touching(leg_1, top)\n"
@@ -189,14 +195,14 @@ def test_a_failure_may_be_recovered_from_where_a_way_out_is_said() -> None:
         RelationSpan("converging", 10.0, 14.0, pair),
         RelationSpan("touching", 14.0, 1e9, pair),
     )
-    script = Script(spans, objects=HERE, identities=NAMES)
+    script = Script(spans, objects=PRESENT, identities=NAMES)
     assert verdict(text, script) is Verdict.SUCCEEDED
 
 
 @pytest.mark.parametrize(
     ("shift", "stands"), [((0, -60), True), ((0, 60), False), ((300, -60), False)]
 )
-def test_what_touches_and_stands_above_is_on_the_other(
+def test_an_object_that_touches_another_from_above_is_on_it(
     shift: tuple[int, int], stands: bool
 ) -> None:
     mind = mind_of((200, 300, 120, 60), (230 + shift[0], 300 + shift[1], 60, 60))
@@ -207,13 +213,13 @@ def test_what_touches_and_stands_above_is_on_the_other(
 
 
 @pytest.mark.parametrize("met", [True, False])
-def test_what_has_met_does_not_fail_to_approach_by_fingers_that_close(met: bool) -> None:
+def test_closing_fingers_do_not_fail_an_approach_after_contact(met: bool) -> None:
     text = "<t> ::= <near> <off>\n<near> ::= converging(leg_1, top)\n<off> ::= gone(leg_1)"
     pair = (TOP, 2)
     spans = [RelationSpan("converging", 1.0, 5.0, pair), RelationSpan("diverging", 5.5, 7.0, pair)]
     if met:
         spans += [RelationSpan(n, 5.0, 1e9, pair) for n in ("touching", "in_contact")]
-    played = watched(text, Script(tuple(spans), objects=HERE, identities=NAMES), 7.0)
+    played = watched(text, Script(tuple(spans), objects=PRESENT, identities=NAMES), 7.0)
     failing = [e for e in played.events if e.kind == "stage_failing" and "`near`" in e.text]
     assert bool(failing) is not met
 
@@ -225,13 +231,13 @@ UNDO = (
 
 
 @pytest.mark.parametrize(("until", "expected"), [(16.0, True), (6.0, False), (4.0, False)])
-def test_what_undoes_an_earlier_stage_has_its_turn_too(until: float, expected: bool) -> None:
+def test_a_step_that_undoes_an_earlier_stage_has_its_own_turn(until: float, expected: bool) -> None:
     """Let down before the wheel is changed: the order is not that of the task."""
     spans = (
         RelationSpan("coupled", 2.0, until, (TOP, 2)),
         RelationSpan("touching", 10.0, 1e9, (TOP, 3)),
     )
-    script = Script(spans, objects=HERE, identities=NAMES)
+    script = Script(spans, objects=PRESENT, identities=NAMES)
     assert (verdict(UNDO, script) is Verdict.SUCCEEDED) is expected
 
 
@@ -242,13 +248,13 @@ BOTH = (
 
 
 @pytest.mark.parametrize(("until", "expected"), [(8.0, False), (14.0, True)])
-def test_what_is_joined_by_and_holds_at_the_same_time(until: float, expected: bool) -> None:
+def test_actions_joined_by_and_must_hold_at_the_same_time(until: float, expected: bool) -> None:
     spans = (
         RelationSpan("touching", 2.0, 18.0, (TOP, 2)),
         RelationSpan("touching", 5.0, until, (TOP, 3)),
         RelationSpan("touching", 12.0, 16.0, (TOP, 4)),
     )
-    played = watched(BOTH, Script(spans, objects=HERE, identities=NAMES), 40.0)
+    played = watched(BOTH, Script(spans, objects=PRESENT, identities=NAMES), 40.0)
     assert (finish(task_of(played)) is Verdict.SUCCEEDED) is expected
     assert expected is not any("not while what is joined" in e.text for e in played.events)
 
@@ -275,22 +281,22 @@ def test_a_for_around_actions_counts_while_all_of_them_hold(
         RelationSpan("touching", *first, (TOP, 3)),
         RelationSpan("touching", *second, (TOP, 4)),
     )
-    script = Script(spans, objects=HERE, identities=NAMES)
+    script = Script(spans, objects=PRESENT, identities=NAMES)
     assert (verdict(LONG, script, 30.0) is Verdict.SUCCEEDED) is expected
 
 
-def test_a_for_around_actions_bears_a_short_break_of_one() -> None:
+def test_a_for_around_actions_tolerates_a_short_interruption() -> None:
     spans = (
         RelationSpan("touching", 2.0, 1e9, (TOP, 2)),
         RelationSpan("touching", 5.0, 1e9, (TOP, 3)),
         RelationSpan("touching", 5.0, 7.0, (TOP, 4)),
         RelationSpan("touching", 7.3, 1e9, (TOP, 4)),
     )
-    script = Script(spans, objects=HERE, identities=NAMES)
+    script = Script(spans, objects=PRESENT, identities=NAMES)
     assert verdict(LONG, script, 30.0) is Verdict.SUCCEEDED
 
 
-def test_what_goes_on_does_not_excuse_what_was_done_before_its_turn() -> None:
+def test_continuing_actions_do_not_excuse_an_early_step() -> None:
     """A table that is stood up before its last leg is on, though the legs are required as well."""
     text = (
         "<t> ::= <a> <b> <stand>\n<a> ::= touching(leg_1, top)\n<b> ::= touching(leg_2, top)\n"
@@ -300,7 +306,7 @@ def test_what_goes_on_does_not_excuse_what_was_done_before_its_turn() -> None:
     assert verdict(text, scene((2, 3.0), (4, 8.0), (3, 13.0))) is Verdict.FAILED
 
 
-def test_stages_joined_by_and_go_on_side_by_side() -> None:
+def test_stages_joined_by_and_run_concurrently() -> None:
     text = (
         "<t> ::= (<p> & <q>) <e>\n<p> ::= touching(leg_1, top) apart(leg_1, top)\n"
         "<q> ::= touching(leg_2, top) apart(leg_2, top)\n<e> ::= touching(leg_3, top)"
@@ -311,12 +317,12 @@ def test_stages_joined_by_and_go_on_side_by_side() -> None:
             RelationSpan("touching", *second, (TOP, 3)),
             RelationSpan("touching", 16.0, 1e9, (TOP, 4)),
         )
-        script = Script(spans, objects=HERE, identities=NAMES)
+        script = Script(spans, objects=PRESENT, identities=NAMES)
         assert verdict(text, script) is Verdict.SUCCEEDED
 
 
 @pytest.mark.parametrize("lasts", [0.5, 2.0])
-def test_what_follows_eight_touches_in_any_order_is_reached(lasts: float) -> None:
+def test_the_stage_after_eight_contacts_in_any_order_is_reached(lasts: float) -> None:
     """A touch counts against the courses without it from its 0.4th second on, however times are rounded."""
     order = (9, 6, 4, 2, 8, 3, 5, 7)
     names = {TOP: {"top": 0.9}, **{k: {f"leg_{k - 1}": 0.9} for k in range(2, 11)}}

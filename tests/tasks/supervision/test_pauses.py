@@ -46,7 +46,7 @@ def paused_for(begins: float, lasts: float) -> RelationSpan:
 
 def cut(text: str, scene: Script) -> list[tuple[int, Mind]]:
     """What comes of the same recording with the pauses cut out, by the number of the frame."""
-    reasoner, mind, lost, before = task_reasoner([parse_task(text)]), Mind(), 0.0, 0.0
+    reasoner, mind, paused_s, before = task_reasoner([parse_task(text)]), Mind(), 0.0, 0.0
     guarded = [s for s in scene.spans if GUARD in s.objects]
     frames: list[tuple[int, Mind]] = []
     spans: list[tuple[float, float]] = []
@@ -54,14 +54,14 @@ def cut(text: str, scene: Script) -> list[tuple[int, Mind]]:
         time = index / UNEVEN
         if any(s.from_s <= time < s.to_s for s in guarded):
             spans.append((before, time))
-            lost += time - before
+            paused_s += time - before
             before = time
             continue
         before = time
-        seen = mind_at(scene, time, index, mind)
-        shifted = tuple(replace(r, since=_moved(r.since, spans)) for r in seen.relations)
-        seen = replace(seen, time=time - lost, relations=shifted)
-        mind = reasoner(seen, Observation(index, time - lost, (640, 480))).mind
+        shifted_mind = mind_at(scene, time, index, mind)
+        shifted = tuple(replace(r, since=_moved(r.since, spans)) for r in shifted_mind.relations)
+        shifted_mind = replace(shifted_mind, time=time - paused_s, relations=shifted)
+        mind = reasoner(shifted_mind, Observation(index, time - paused_s, (640, 480))).mind
         frames.append((index, mind))
     return frames
 
@@ -90,7 +90,7 @@ guarding = st.builds(
 @given(
     st.sampled_from(TASKS), st.lists(span, max_size=7), st.lists(guarding, min_size=1, max_size=3)
 )
-def test_a_pause_is_as_if_it_were_cut_out_of_the_recording(
+def test_a_pause_is_equivalent_to_cutting_it_out_of_the_recording(
     text: str, spans: list[RelationSpan], pauses: list[RelationSpan]
 ) -> None:
     scene = script([*spans, *pauses])
@@ -129,13 +129,13 @@ LIFT = RelationSpan("converging", 14.0, 19.0, (PART, TRAY))
         (f"for 6 s {PAUSE} or touching(guard, part)", True),
     ],
 )
-def test_a_pause_does_not_break_what_must_hold(clauses: str, good: bool) -> None:
+def test_a_pause_does_not_interrupt_a_duration(clauses: str, good: bool) -> None:
     played = watched(clauses, TOUCH, paused_for(3.8, 5.4), AGAIN, LIFT)
     assert (finish(task_of(played)) is Verdict.SUCCEEDED) == good
 
 
 @pytest.mark.parametrize("inside", [True, False])
-def test_a_time_limit_around_more_than_is_paused_goes_on(inside: bool) -> None:
+def test_a_time_limit_around_a_paused_stage_keeps_running(inside: bool) -> None:
     clauses = f"within 4 s {PAUSE}" if inside else f"{PAUSE}"
     text = "<put> ::= <grasp>\n<grasp> ::= touching(arm, part) for 3 s {}"
     text = text if inside else text.replace("<grasp>\n", "<grasp> within 4 s\n")
@@ -147,12 +147,12 @@ def test_a_time_limit_around_more_than_is_paused_goes_on(inside: bool) -> None:
 
 def test_a_pause_and_its_end_are_reported() -> None:
     played = watched(f"for 6 s {PAUSE}", TOUCH, paused_for(3.8, 5.4), AGAIN, LIFT)
-    told = [
+    reported = [
         (e.time, e.kind, e.text)
         for e in played.events
         if e.kind in ("stage_paused", "stage_resumed")
     ]
-    assert told == [
+    assert reported == [
         (
             3.8,
             "stage_paused",
@@ -169,41 +169,41 @@ def test_a_pause_and_its_end_are_reported() -> None:
 
 
 @pytest.mark.parametrize(
-    ("condition", "why"),
+    ("condition", "reason"),
     [
         ("apart(guard, part)", "the guard and the part have been apart since 0.0 s"),
         ("gap(arm, part) < 9 px", "the arm and the part have been at a gap below 9 px since 0.0 s"),
         ("signal_on(hold) or apart(guard, part)", "`signal_on(hold) or apart(guard, part)` since"),
     ],
 )
-def test_what_pauses_is_told_in_words(condition: str, why: str) -> None:
+def test_the_cause_of_a_pause_is_explained(condition: str, reason: str) -> None:
     scene = replace(script([TOUCH]), gaps=lambda time: 5.0)
     reasoner = task_reasoner([parse_task(GRASP.format(f"pauses when {condition}"))])
     stage = task_of(play(reasoner, scene, 3.0, FPS)).stages[0]
     assert stage.status is Status.PAUSED
-    assert why in stage.evidence
+    assert reason in stage.evidence
 
 
-def test_what_must_never_be_counts_in_a_pause() -> None:
+def test_invariants_apply_during_a_pause() -> None:
     text = GRASP + "\nnever touching(part, tray)"
     spans = (TOUCH, paused_for(3.0, 6.0), RelationSpan("touching", 5.0, 7.0, (PART, TRAY)))
     assert finish(task_of(watched(PAUSE, *spans, text=text))) is Verdict.INTERRUPTED
 
 
-def test_a_stage_that_was_failing_stays_so() -> None:
+def test_a_failing_stage_is_not_paused() -> None:
     away = RelationSpan("diverging", 3.0, 30.0, (ARM, PART))
     played = watched(f"for 6 s {PAUSE}", TOUCH, away, paused_for(6.0, 12.0))
     assert {task_of(played, t).stages[0].status for t in (5.8, 8.0, 17.0)} == {Status.FAILING}
     assert not [e for e in played.events if e.kind == "stage_paused"]
 
 
-def test_what_pauses_may_have_to_last() -> None:
+def test_a_pause_condition_can_require_a_duration() -> None:
     played = watched(f"for 6 s {PAUSE} for 1 s", TOUCH, paused_for(2.0, 5.0), AGAIN, LIFT)
     assert task_of(played, 2.8).stages[0].status is Status.PROGRESSING
     assert task_of(played, 3.2).stages[0].status is Status.PAUSED
 
 
-def test_what_is_not_seen_any_more_pauses_for_two_seconds() -> None:
+def test_a_pause_lasts_two_seconds_after_its_cause_is_hidden() -> None:
     hold = RelationSpan("touching", 1.0, 20.0, (ARM, PART))
     scene = replace(script([hold, paused_for(2.0, 2.0)]), hidden={GUARD: (4.0, 9.0)})
     reasoner = task_reasoner([parse_task(GRASP.format(f"for 12 s {PAUSE}"))])
@@ -223,13 +223,13 @@ def test_pauses_around_and_inside_both_count() -> None:
     assert finish(task_of(played)) is Verdict.SUCCEEDED
 
 
-def test_many_pauses_are_kept_in_bounds_and_none_is_lost() -> None:
+def test_the_record_of_many_pauses_is_bounded_and_exact() -> None:
     (condition,) = parse_task(f"<put> ::= touching(arm, part) {PAUSE}").stages[0].body.conditions  # type: ignore[union-attr]
     record = PauseRecord()
     (relation,) = [r for r in mind_at(script([paused_for(0.0, 1e9)]), 1.0, 0, Mind()).relations
                    if set(r.objects) == {ARM, GUARD} and r.name == "touching"]  # fmt: skip
     for k in range(4 * MOST_SPANS):
-        seen = relation if k % 2 else replace(relation, truth=Truth.FALSE)
-        record = record.noted([condition], lambda _, s=seen: s, float(k), k + 1.0, 2.0)  # type: ignore[misc]
+        observed = relation if k % 2 else replace(relation, truth=Truth.FALSE)
+        record = record.noted([condition], lambda _, s=observed: s, float(k), k + 1.0, 2.0)  # type: ignore[misc]
     assert len(record.pauses[0].spans) == MOST_SPANS
     assert record.elapsed([condition], 0.0, 4.0 * MOST_SPANS) == 2.0 * MOST_SPANS

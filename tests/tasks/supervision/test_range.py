@@ -19,7 +19,9 @@ ALONE = TASK.splitlines()[2]
 NEAR = (RelationSpan("converging", 0.0, 4.0), RelationSpan("diverging", 8.0, 30.0))
 
 
-def lived(gaps: Callable[[float], float], task: str = TASK, until: float = 25.0) -> ScriptedRun:
+def watch_gaps(
+    gaps: Callable[[float], float], task: str = TASK, until: float = 25.0
+) -> ScriptedRun:
     return play(task_reasoner([parse_task(task)]), Script(NEAR, gaps=gaps), until, fps=5.0)
 
 
@@ -34,13 +36,13 @@ def lived(gaps: Callable[[float], float], task: str = TASK, until: float = 25.0)
         (ALONE, lambda t: 60.0 if not 5 < t < 5.3 else 101.0, Verdict.SUCCEEDED),
     ],
 )
-def test_a_range_is_kept_or_left(
+def test_staying_in_a_range_succeeds_and_leaving_it_fails(
     task: str, gaps: Callable[[float], float], verdict: Verdict
 ) -> None:
-    assert finish(lived(gaps, task).last.tasks[0]) is verdict
+    assert finish(watch_gaps(gaps, task).last.tasks[0]) is verdict
 
 
-def test_what_bobs_within_the_range_keeps_it() -> None:
+def test_oscillation_within_the_range_is_accepted() -> None:
     played = play(
         task_reasoner([parse_task(TASK)]),
         Script(NEAR[:1], gaps=lambda t: max(60.0, 180 - 30 * t) + 15 * sin(2 * t)),
@@ -51,19 +53,19 @@ def test_what_bobs_within_the_range_keeps_it() -> None:
 
 
 def test_coming_nearer_within_a_range_is_expected() -> None:
-    (task,) = lived(lambda t: 60.0 + 15 * sin(2 * t), ALONE, 5.0).last.tasks
+    (task,) = watch_gaps(lambda t: 60.0 + 15 * sin(2 * t), ALONE, 5.0).last.tasks
     assert "converging" in {e.relation for e in task.expected}
 
 
 def test_a_range_begins_when_the_gap_comes_into_it() -> None:
-    played = lived(lambda t: max(60.0, 180 - 30 * t))
+    played = watch_gaps(lambda t: max(60.0, 180 - 30 * t))
     begun = next(e for e in played.events if e.data.get("stage") == "stay")
     assert begun.time == pytest.approx(80 / 30, abs=0.7)
 
 
-def test_a_comparison_in_a_sign_alone_is_looked_at() -> None:
+def test_a_comparison_in_an_end_condition_is_evaluated() -> None:
     task = "<near> ::= converging(arm, satellite) ends when gap(arm, satellite) < 90 px"
-    played = lived(lambda t: 180 - 30 * min(t, 4.0), task, 8.0)
+    played = watch_gaps(lambda t: 180 - 30 * min(t, 4.0), task, 8.0)
     (stage,) = played.last.tasks[0].stages
     assert stage.status is Status.DONE
     assert finish(played.last.tasks[0]) is Verdict.SUCCEEDED

@@ -34,21 +34,21 @@ MISSED = (
 NOBODY: Mapping[int, Mapping[str, float]] = {}
 
 
-def lived(
-    named_at: Mapping[int, float], spans: tuple[RelationSpan, ...], until: float = 16.0
+def final_mind(
+    identified_at: Mapping[int, float], spans: tuple[RelationSpan, ...], until: float = 16.0
 ) -> Mind:
     """What is believed in the end where objects are named at some times."""
     reasoner, mind = task_reasoner([parse_task(DOCK)]), Mind()
     for index in range(round(until * 10) + 1):
         now = index / 10
-        known = {i: IDENTITIES[i] for i, t in named_at.items() if now >= t}
-        mind = mind_at(Script(spans, identities=known), now, index, mind)
+        identified = {i: IDENTITIES[i] for i, t in identified_at.items() if now >= t}
+        mind = mind_at(Script(spans, identities=identified), now, index, mind)
         mind = reasoner(mind, Observation(index, now, (640, 480))).mind
     return mind
 
 
-def told(named_at: Mapping[int, float], spans: tuple[RelationSpan, ...]) -> TaskBelief:
-    return lived(named_at, spans).tasks[0]
+def final_belief(identified_at: Mapping[int, float], spans: tuple[RelationSpan, ...]) -> TaskBelief:
+    return final_mind(identified_at, spans).tasks[0]
 
 
 def statuses(belief: TaskBelief) -> list[Status]:
@@ -56,29 +56,30 @@ def statuses(belief: TaskBelief) -> list[Status]:
 
 
 @pytest.mark.parametrize("late", [2.0, 4.5, 7.0, 11.0])
-def test_a_late_name_gives_the_verdict_of_an_early_one(late: float) -> None:
-    early = told({ARM: 0.0, SATELLITE: 0.0}, GOOD)
+def test_a_late_identification_gives_the_verdict_of_an_early_one(late: float) -> None:
+    early = final_belief({ARM: 0.0, SATELLITE: 0.0}, GOOD)
     assert early.verdict is Verdict.SUCCEEDED
     for named in (
         {ARM: 0.0, SATELLITE: late},
         {ARM: late, SATELLITE: 0.0},
         {ARM: late, SATELLITE: 3.0},
     ):
-        assert told(named, GOOD).verdict is Verdict.SUCCEEDED
-        assert statuses(told(named, GOOD)) == [Status.DONE] * 3
+        assert final_belief(named, GOOD).verdict is Verdict.SUCCEEDED
+        assert statuses(final_belief(named, GOOD)) == [Status.DONE] * 3
 
 
-def test_what_failed_before_the_name_has_failed() -> None:
-    early = finish(told({ARM: 0.0, SATELLITE: 0.0}, MISSED))
+def test_a_failure_before_the_identification_is_found() -> None:
+    early = finish(final_belief({ARM: 0.0, SATELLITE: 0.0}, MISSED))
     assert early is Verdict.FAILED
-    assert finish(told({ARM: 0.0, SATELLITE: 7.0}, MISSED)) is early
+    assert finish(final_belief({ARM: 0.0, SATELLITE: 7.0}, MISSED)) is early
 
 
 @settings(max_examples=8, deadline=None)
 @given(st.floats(0.5, 11.0))
-def test_after_the_name_the_hypotheses_are_those_of_an_early_name(late: float) -> None:
+def test_a_late_identification_gives_the_hypotheses_of_an_early_one(late: float) -> None:
     early, other = (
-        lived({ARM: 0.0, SATELLITE: t}, GOOD, 14.0).recall(MEMORY)[0].posterior for t in (0.0, late)
+        final_mind({ARM: 0.0, SATELLITE: t}, GOOD, 14.0).recall(MEMORY)[0].posterior
+        for t in (0.0, late)
     )
     assert early is not None
     assert other is not None
@@ -87,11 +88,11 @@ def test_after_the_name_the_hypotheses_are_those_of_an_early_name(late: float) -
 
 
 def test_stored_observations_are_limited_and_released() -> None:
-    waiting = lived({ARM: 0.0}, GOOD, 70.0).recall(MEMORY)[0]
+    waiting = final_mind({ARM: 0.0}, GOOD, 70.0).recall(MEMORY)[0]
     assert len(waiting.past_steps) <= MEMORY_S / EVERY_S + 2
     assert all(not look.mind.tasks for look in waiting.past_steps)
     assert all("tasks" not in look.mind.memory for look in waiting.past_steps)
-    assert lived({ARM: 0.0, SATELLITE: 3.0}, GOOD, 5.0).recall(MEMORY)[0].past_steps == ()
+    assert final_mind({ARM: 0.0, SATELLITE: 3.0}, GOOD, 5.0).recall(MEMORY)[0].past_steps == ()
 
 
 def test_an_object_that_comes_late_has_no_past() -> None:

@@ -22,17 +22,21 @@ IN_TIME = (1.0, 4.0, 7.0, 10.0, 13.0, 16.0)
 FPS = 5.0
 
 
-def keeps_time(onsets: Sequence[float], now: float, least: float, most: float) -> bool:
+def keeps_time(onsets: Sequence[float], now: float, shortest: float, longest: float) -> bool:
     """The definition, over the whole past: the last beat in time is no longer ago than the longest period."""
-    good = [at for i, at in enumerate(onsets) if i == 0 or least <= at - onsets[i - 1] <= most]
-    return bool(good) and now - good[-1] <= most
+    in_time = [
+        onset
+        for i, onset in enumerate(onsets)
+        if i == 0 or shortest <= onset - onsets[i - 1] <= longest
+    ]
+    return bool(in_time) and now - in_time[-1] <= longest
 
 
 gaps = st.lists(st.integers(1, 60).map(lambda n: n / 10), max_size=16)
 
 
 @given(gaps, st.integers(0, 30), st.integers(1, 40))
-def test_keeping_time_is_as_it_is_defined(steps: list[float], least: int, more: int) -> None:
+def test_rhythm_is_tracked_as_defined(steps: list[float], least: int, more: int) -> None:
     period = (least / 10 + 0.013, (least + more) / 10 + 0.017)
     turns = [sum(steps[: i + 1]) for i in range(len(steps))]  # so, not so, so, ...
     beats: Beats | None = None
@@ -46,7 +50,7 @@ def test_keeping_time_is_as_it_is_defined(steps: list[float], least: int, more: 
         assert beats.keeps == keeps_time(past[::2], now, *period)
 
 
-def test_what_is_not_observed_makes_no_period_too_long() -> None:
+def test_unobserved_time_does_not_make_a_period_too_long() -> None:
     beats = heard(None, Truth.TRUE, 0.0, (0.0, 0.0), (2.0, 4.0))
     for k in range(1, 60):
         truth = Truth.UNKNOWN if 10 <= k < 50 else Truth.FALSE
@@ -57,7 +61,7 @@ def test_what_is_not_observed_makes_no_period_too_long() -> None:
     assert beats.late
 
 
-def test_while_nobody_listens_no_time_passes() -> None:
+def test_gaps_between_updates_do_not_count() -> None:
     beats = heard(None, Truth.TRUE, 0.0, (0.0, 0.0), (2.0, 4.0))
     beats = heard(beats, Truth.FALSE, 1.0, (0.0, 1.0), (2.0, 4.0))
     assert heard(beats, Truth.FALSE, 1.0, (59.8, 60.0), (2.0, 4.0)).keeps
@@ -67,7 +71,7 @@ def test_while_nobody_listens_no_time_passes() -> None:
 def wiped(
     onsets: Sequence[float], until: float, text: str = WIPE, more: Sequence[RelationSpan] = ()
 ) -> ScriptedRun:
-    spans = [RelationSpan("touching", at, at + 0.6, (WIPER, GLASS)) for at in onsets]
+    spans = [RelationSpan("touching", onset, onset + 0.6, (WIPER, GLASS)) for onset in onsets]
     objects = dict.fromkeys(NAMES, (0.0, 1e9))
     script = Script((*spans, *more), objects=objects, identities=NAMES)
     return play(task_reasoner([parse_task(text)]), script, until, FPS)
@@ -83,11 +87,13 @@ def wiped(
         ((), Verdict.UNKNOWN),
     ],
 )
-def test_a_stage_keeps_time_or_fails(onsets: Sequence[float], verdict: Verdict) -> None:
+def test_a_stage_succeeds_in_rhythm_and_fails_out_of_it(
+    onsets: Sequence[float], verdict: Verdict
+) -> None:
     assert finish(task_of(wiped(onsets, 20.0))) is verdict
 
 
-def test_it_goes_on_until_what_comes_next_begins() -> None:
+def test_a_rhythm_lasts_until_the_next_stage_begins() -> None:
     text = """<clean> ::= <wipe> <done>
     <wipe> ::= touching(wiper, glass) every 4 s
     <done> ::= touching(cup, glass)"""
@@ -96,17 +102,17 @@ def test_it_goes_on_until_what_comes_next_begins() -> None:
     assert finish(task_of(played)) is Verdict.SUCCEEDED
 
 
-def test_missed_times_and_recoveries_are_reported() -> None:
+def test_missed_beats_and_recoveries_are_reported() -> None:
     played = wiped((1.0, 4.0, 10.4, 13.0, 15.8), 18.0)
-    told = [e.text for e in played.events if e.kind == "stage_failing"]
-    assert told == [
+    texts = [e.text for e in played.events if e.kind == "stage_failing"]
+    assert texts == [
         "Stage `wipe` is failing: the wiper and the glass have been out of time since 8.2 s; "
         "stage `wipe` requires them to be touching every 2 s to 4 s."
     ]
     assert task_of(played).stages[0].status is Status.PROGRESSING
 
 
-def test_a_pause_stops_its_clock() -> None:
+def test_a_pause_stops_the_clock_of_a_rhythm() -> None:
     text = WIPE + " pauses when touching(cup, wiper)"
     pause = RelationSpan("touching", 7.9, 14.1, (CUP, WIPER))
     onsets = (1.0, 4.0, 7.0, 16.0, 19.0, 22.0)
@@ -114,7 +120,7 @@ def test_a_pause_stops_its_clock() -> None:
     assert finish(task_of(wiped(onsets, 24.0))) is Verdict.FAILED
 
 
-def test_it_may_stand_in_conditions_and_invariants() -> None:
+def test_a_rhythm_can_be_used_in_conditions_and_invariants() -> None:
     text = """<hold> ::= touching(cup, glass) for 10 s fails when not touching(wiper, glass) every 4 s
     always touching(wiper, glass) every 6 s for 2 s"""
     hold = [RelationSpan("touching", 1.0, 30.0, (CUP, GLASS))]

@@ -67,9 +67,9 @@ def verdict(played: ScriptedRun) -> Verdict:
 
 def done(played: ScriptedRun) -> list[int]:
     """The parts whose rounds were told complete, by what their objects are."""
-    told = [e for e in played.events if e.kind == "stage_done" and "take" in e.data["stage"]]
-    bound = {b.actor: b.object_id for b in task_of(played).bindings}
-    return [(bound[e.data["stage"][5:-1]] or 0) - FIRST for e in told]
+    completed = [e for e in played.events if e.kind == "stage_done" and "take" in e.data["stage"]]
+    bindings = {b.actor: b.object_id for b in task_of(played).bindings}
+    return [(bindings[e.data["stage"][5:-1]] or 0) - FIRST for e in completed]
 
 
 orders = st.permutations(range(PARTS)).flatmap(
@@ -79,13 +79,13 @@ orders = st.permutations(range(PARTS)).flatmap(
 
 @settings(max_examples=3)
 @given(orders, st.booleans())
-def test_the_loop_is_judged_as_the_loop_written_out(order: tuple[int, ...], leaves: bool) -> None:
-    one = watched(loop(), emptied(order, leaves=leaves), len(order))
-    known = emptied(order, alike=False, leaves=leaves)
-    twin = watched(written_out(order), known, len(order))
-    assert verdict(one) is verdict(twin)
-    assert done(one) == list(order)
-    assert [e.kind for e in one.events] == [e.kind for e in twin.events]
+def test_a_loop_is_equivalent_to_the_loop_written_out(order: tuple[int, ...], leaves: bool) -> None:
+    looped = watched(loop(), emptied(order, leaves=leaves), len(order))
+    distinct = emptied(order, alike=False, leaves=leaves)
+    unrolled = watched(written_out(order), distinct, len(order))
+    assert verdict(looped) is verdict(unrolled)
+    assert done(looped) == list(order)
+    assert [e.kind for e in looped.events] == [e.kind for e in unrolled.events]
 
 
 @pytest.mark.parametrize(
@@ -96,14 +96,12 @@ def test_the_loop_is_judged_as_the_loop_written_out(order: tuple[int, ...], leav
         ((1, 1), " at least 2 times", False),
     ],
 )
-def test_rounds_are_counted_and_one_part_makes_one_round(
-    order: tuple[int, ...], times: str, expected: bool
-) -> None:
+def test_each_part_counts_as_one_round(order: tuple[int, ...], times: str, expected: bool) -> None:
     played = watched(loop(times), emptied(order), len(order))
     assert (verdict(played) is Verdict.SUCCEEDED) is expected
 
 
-def test_a_part_that_comes_later_has_the_next_round() -> None:
+def test_a_part_that_enters_later_has_the_next_round() -> None:
     script = emptied((0, 2))
     late = {**script.objects, FIRST: (0.0, 8.5), FIRST + 2: (8.6, 1e9)}
     few = {k: v for k, v in late.items() if k not in (FIRST + 1,)}
@@ -112,16 +110,16 @@ def test_a_part_that_comes_later_has_the_next_round() -> None:
     assert done(played)[-1] == 2
 
 
-def test_nobody_waits_for_parts_that_do_not_come() -> None:
-    at_first = task_of(watched(loop(), emptied(()), 0))
-    assert {s.status for s in at_first.stages if s.stage == "take(part_9)"} == {Status.PENDING}
+def test_missing_parts_of_a_loop_are_not_waited_for() -> None:
+    initial = task_of(watched(loop(), emptied(()), 0))
+    assert {s.status for s in initial.stages if s.stage == "take(part_9)"} == {Status.PENDING}
     nobody = task_of(watched(loop(), replace(emptied(()), identities={}), 0))
     assert nobody.evidence == "not found yet: arm, bin, part"
 
 
-def test_rounds_that_may_come_are_one_prospect_while_their_parts_are_not_there() -> None:
-    one = {k: v for k, v in emptied((0,)).objects.items() if k <= FIRST}
-    next_ones = task_of(watched(loop(), replace(emptied(()), objects=one), 0)).prospects
+def test_future_rounds_without_parts_are_one_prospect() -> None:
+    present = {k: v for k, v in emptied((0,)).objects.items() if k <= FIRST}
+    next_ones = task_of(watched(loop(), replace(emptied(()), objects=present), 0)).prospects
     rounds = [p.stage for p in next_ones if p.stage.startswith("take")]
     assert rounds == ["take(part_2)"]
 
@@ -129,9 +127,9 @@ def test_rounds_that_may_come_are_one_prospect_while_their_parts_are_not_there()
 def test_a_run_resumed_within_a_round_continues_unchanged() -> None:
     script, whole = emptied((1, 0)), watched(loop(), emptied((1, 0)), 2)
     reasoner = task_reasoner([parse_task(loop())])
-    at = next(i for i, m in enumerate(whole.minds) if m.time >= 4.0)
-    mind, events = load_state(dump_state(whole.minds[at])), list[Event]()
-    for index in range(at + 1, len(whole.minds)):
+    resumed_at = next(i for i, m in enumerate(whole.minds) if m.time >= 4.0)
+    mind, events = load_state(dump_state(whole.minds[resumed_at])), list[Event]()
+    for index in range(resumed_at + 1, len(whole.minds)):
         now = mind_at(script, index / 4.0, index, mind)
         outcome = reasoner(now, Observation(index, index / 4.0, (640, 480)))
         mind, events = outcome.mind, [*events, *outcome.events]
@@ -146,15 +144,15 @@ def repeated(
     if last_s is not None:
         spans.append(RelationSpan("touching", last_s, 1e9, (ARM, FIRST)))
     names = {ARM: {"arm": 0.9}, BIN: {"bin": 0.9}, FIRST: {"part": 0.9}}
-    here = dict.fromkeys(names, (0.0, 1e9))
+    present = dict.fromkeys(names, (0.0, 1e9))
     stages = "\n<a> ::= touching(arm, bin)\n<b> ::= apart(arm, bin)\n<c> ::= touching(arm, part)"
     used = "\n".join(x for x in stages.splitlines() if x[:3] in text)
-    script = Script(tuple(spans), objects=here, identities=names)
+    script = Script(tuple(spans), objects=present, identities=names)
     return play(task_reasoner([parse_task(f"<t> ::= {text}\n{used}")]), script, 24.0)
 
 
 @pytest.mark.parametrize(
-    ("times", "least"),
+    ("times", "required"),
     [
         ("<a> at least 2 times", 2),
         ("<a> at least 3 times", 3),
@@ -164,29 +162,29 @@ def repeated(
         ("(<a> <b>) at least 2 times", 2),
     ],
 )
-@pytest.mark.parametrize("seen", [1, 2, 3])
-def test_a_round_that_is_missing_is_not_passed_over(times: str, least: int, seen: int) -> None:
-    touches = [(2.0 + 4.0 * k, 4.0 + 4.0 * k) for k in range(seen)]
-    played = repeated(f"{times} <c>", touches, 2.0 + 4.0 * seen)
-    assert (verdict(played) is Verdict.SUCCEEDED) is (seen >= least)
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_a_missing_round_prevents_success(times: str, required: int, count: int) -> None:
+    touches = [(2.0 + 4.0 * k, 4.0 + 4.0 * k) for k in range(count)]
+    played = repeated(f"{times} <c>", touches, 2.0 + 4.0 * count)
+    assert (verdict(played) is Verdict.SUCCEEDED) is (count >= required)
 
 
 @pytest.mark.parametrize("clause", ["", " for 2 s"])
-def test_what_goes_on_is_one_round_however_long_it_lasts(clause: str) -> None:
+def test_a_continuing_action_is_one_round(clause: str) -> None:
     text = f"<a>{clause} at least 2 times <c>"
     assert verdict(repeated(text, [(2.0, 12.0)], 14.0)) is not Verdict.SUCCEEDED
     assert verdict(repeated(text, [(2.0, 6.0), (8.0, 12.0)], 14.0)) is Verdict.SUCCEEDED
 
 
-@pytest.mark.parametrize(("text", "least"), [("<a>+", 1), ("<a> at least 2 times", 2)])
-@pytest.mark.parametrize("seen", [1, 2, 3])
-def test_a_task_that_ends_with_rounds_has_succeeded_once(text: str, least: int, seen: int) -> None:
-    played = repeated(text, [(2.0 + 4.0 * k, 4.0 + 4.0 * k) for k in range(seen)], None)
-    told = [e for e in played.events if e.kind == "verdict"]
-    assert [e.data["verdict"] for e in told] == ["succeeded"] * (seen >= least)
+@pytest.mark.parametrize(("text", "required"), [("<a>+", 1), ("<a> at least 2 times", 2)])
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_a_task_that_ends_with_a_loop_succeeds_once(text: str, required: int, count: int) -> None:
+    played = repeated(text, [(2.0 + 4.0 * k, 4.0 + 4.0 * k) for k in range(count)], None)
+    verdicts = [e for e in played.events if e.kind == "verdict"]
+    assert [e.data["verdict"] for e in verdicts] == ["succeeded"] * (count >= required)
 
 
-def test_an_actor_whose_turn_is_missing_is_not_passed_over() -> None:
+def test_a_missing_turn_of_an_actor_prevents_success() -> None:
     text = "<t> ::= for each thing of (bin, part) <meet(thing)> <leave>\n"
     text += "<meet(thing)> ::= touching(arm, thing)\n<leave> ::= apart(arm, bin) for 2 s"
     names = {ARM: {"arm": 0.9}, BIN: {"bin": 0.9}, FIRST: {"part": 0.9}}
@@ -195,7 +193,7 @@ def test_an_actor_whose_turn_is_missing_is_not_passed_over() -> None:
         RelationSpan("touching", 6.0, 8.0, (ARM, BIN)),
     ]
     for count, expected in ((1, False), (2, True)):
-        here = dict.fromkeys(names, (0.0, 1e9))
-        script = Script(tuple(spans[:count]), objects=here, identities=names)
+        present = dict.fromkeys(names, (0.0, 1e9))
+        script = Script(tuple(spans[:count]), objects=present, identities=names)
         played = play(task_reasoner([parse_task(text)]), script, 20.0)
         assert (verdict(played) is Verdict.SUCCEEDED) is expected

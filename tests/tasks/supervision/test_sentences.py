@@ -1,4 +1,4 @@
-"""Until when, or since when, a step that is over is told to have been what it should be."""
+"""The times at which past steps are reported to have held."""
 
 from __future__ import annotations
 
@@ -20,67 +20,67 @@ from visup.tasks.verification.reported_relations import (
 )
 from visup.tasks.verification.step_monitor import StepMonitor
 
-NEARED = StepMonitor(1.0, begun=2.3, helped_since=2.0, helped_at=3.0)
-HELD = StepMonitor(1.0, begun=3.9, held=True, held_s=4.3, fulfilled=True)
+CONVERGED = StepMonitor(1.0, begun=2.3, helped_since=2.0, helped_at=3.0)
+HOLDING = StepMonitor(1.0, begun=3.9, held=True, held_s=4.3, fulfilled=True)
 PAIR = ("arm", "part")
 PARTED = with_reported((), PAIR, "diverging", 2.4)
 COUPLED = with_reported((), PAIR, "coupled", 8.3)
 
 
 @pytest.mark.parametrize(
-    ("action", "monitor", "followed", "denied", "told"),
+    ("action", "monitor", "followed", "refuted", "text"),
     [
-        ("converging", NEARED, (), None, "converging until 3.0 s"),
-        ("converging", NEARED, (2.6,), None, "converging until 2.6 s"),
+        ("converging", CONVERGED, (), None, "converging until 3.0 s"),
+        ("converging", CONVERGED, (2.6,), None, "converging until 2.6 s"),
         # What followed may have begun before it was noticed that they converge, ...
-        ("converging", NEARED, (2.2,), None, "converging from 2.0 s to 2.2 s"),
+        ("converging", CONVERGED, (2.2,), None, "converging from 2.0 s to 2.2 s"),
         # ... what had been so before says nothing of the end, ...
-        ("converging", NEARED, (1.5,), None, "converging until 3.0 s"),
+        ("converging", CONVERGED, (1.5,), None, "converging until 3.0 s"),
         # ... nor hides what came after.
-        ("converging", NEARED, (1.5, 2.6), None, "converging until 2.6 s"),
-        ("coupled", HELD, (), None, "coupled since 3.9 s"),
-        ("coupled", HELD, (7.9,), None, "coupled since 3.9 s"),
-        ("coupled", HELD, (7.9,), 7.9, "coupled until 7.9 s"),
-        ("coupled", HELD, (), 3.0, "coupled since 3.9 s"),
+        ("converging", CONVERGED, (1.5, 2.6), None, "converging until 2.6 s"),
+        ("coupled", HOLDING, (), None, "coupled since 3.9 s"),
+        ("coupled", HOLDING, (7.9,), None, "coupled since 3.9 s"),
+        ("coupled", HOLDING, (7.9,), 7.9, "coupled until 7.9 s"),
+        ("coupled", HOLDING, (), 3.0, "coupled since 3.9 s"),
         # What excludes it was told in between: it began anew.
         (
             "converging",
-            replace(NEARED, reported=PARTED),
+            replace(CONVERGED, reported=PARTED),
             (),
             None,
             "converging from 2.4 s to 3.0 s",
         ),
         (
             "coupled",
-            replace(HELD, reported=with_reported((), PAIR, "diverging", 5.6)),
+            replace(HOLDING, reported=with_reported((), PAIR, "diverging", 5.6)),
             (),
             None,
             "since 5.6 s",
         ),
         (
             "coupled",
-            replace(HELD, reported=with_reported((), PAIR, "touching", 5.6)),
+            replace(HOLDING, reported=with_reported((), PAIR, "touching", 5.6)),
             (),
             None,
             "since 3.9 s",
         ),
     ],
 )
-def test_times_of_what_is_over_agree_with_what_follows(
+def test_times_of_past_steps_agree_with_later_events(
     action: str,
     monitor: StepMonitor,
     followed: tuple[float, ...],
-    denied: float | None,
-    told: str,
+    refuted: float | None,
+    text: str,
 ) -> None:
     step = TaskStep(action, ("arm", "part"), "stage")
-    status, why = outcome(step, ACTIONS[action], monitor, 8.2, followed, denied)
+    status, why = outcome(step, ACTIONS[action], monitor, 8.2, followed, refuted)
     assert status is Status.DONE
-    assert why.endswith(told)
+    assert why.endswith(text)
 
 
 @pytest.mark.parametrize(
-    ("monitor", "told"),
+    ("monitor", "text"),
     [
         (StepMonitor(8.3, helped_by="diverging", helped_since=8.1), "diverging since 8.1 s"),
         (
@@ -89,18 +89,18 @@ def test_times_of_what_is_over_agree_with_what_follows(
         ),
     ],
 )
-def test_what_excludes_what_was_told_is_told_to_begin_no_sooner(
-    monitor: StepMonitor, told: str
+def test_a_relation_begins_no_sooner_than_an_exclusive_one_was_reported(
+    monitor: StepMonitor, text: str
 ) -> None:
     """Two that were told to be coupled at 8.3 s are not told, later, to have drawn apart since 8.1 s."""
     step = TaskStep("diverging", PAIR, "stage")
     going_on = replace(monitor, status=Status.PROGRESSING)
-    assert evidence(step, ACTIONS["diverging"], going_on, 8.5, ACTIONS).endswith(told)
+    assert evidence(step, ACTIONS["diverging"], going_on, 8.5, ACTIONS).endswith(text)
     failing = replace(
         monitor, status=Status.FAILING, contrary="diverging", contrary_since=monitor.helped_since
     )
     step = TaskStep("coupled", PAIR, "stage")
-    assert f"{told};" in evidence(step, ACTIONS["coupled"], failing, 8.5, ACTIONS)
+    assert f"{text};" in evidence(step, ACTIONS["coupled"], failing, 8.5, ACTIONS)
 
 
 def test_a_condition_by_which_a_stage_fails_is_quoted() -> None:
@@ -116,11 +116,11 @@ def test_a_condition_by_which_a_stage_fails_is_quoted() -> None:
     under_way = StepMonitor(
         3.0, status=Status.PROGRESSING, helped_by="range(arm, part) < 5 m", helped_since=3.5
     )
-    told = evidence(step, ACTIONS["converging"], under_way, 9.0, ACTIONS)
-    assert told == "`range(arm, part) < 5 m` has held since 3.5 s"
+    text = evidence(step, ACTIONS["converging"], under_way, 9.0, ACTIONS)
+    assert text == "`range(arm, part) < 5 m` has held since 3.5 s"
 
 
-def test_what_was_going_on_when_a_stage_was_left_is_not_told_to_go_on_later() -> None:
+def test_continuing_relations_are_put_into_the_past_tense() -> None:
     assert in_retrospect("the arm has been moving since 3.9 s", 4.9) == (
         "at 4.9 s the arm had been moving since 3.9 s"
     )
@@ -129,23 +129,23 @@ def test_what_was_going_on_when_a_stage_was_left_is_not_told_to_go_on_later() ->
 
 
 RELATIONS = st.sampled_from(sorted(ACTIONS))
-TELLINGS = st.lists(st.tuples(st.permutations(PAIR), RELATIONS, st.floats(0, 9)))
+REPORTS = st.lists(st.tuples(st.permutations(PAIR), RELATIONS, st.floats(0, 9)))
 
 
-@given(TELLINGS, RELATIONS, st.floats(0, 9))
+@given(REPORTS, RELATIONS, st.floats(0, 9))
 def test_exclusive_relations_are_not_reported_for_the_same_time(
-    tellings: list[tuple[list[str], str, float]], relation: str, since: float
+    reports: list[tuple[list[str], str, float]], relation: str, since: float
 ) -> None:
-    told = merged_reports(with_reported((), who, what, until) for who, what, until in tellings)
-    begins = since_reported(told, PAIR, relation, since)
+    merged = merged_reports(with_reported((), pair, name, until) for pair, name, until in reports)
+    begins = since_reported(merged, PAIR, relation, since)
     assert begins >= since
-    untils = [until for _, what, until in tellings if excludes(what, relation)]
+    untils = [until for _, name, until in reports if excludes(name, relation)]
     assert begins == max((since, *untils))
-    assert since_reported(told, ("arm", "target"), relation, since) == since
+    assert since_reported(merged, ("arm", "target"), relation, since) == since
     assert not excludes(relation, relation)
-    assert len(told) == len({what for _, what, _ in tellings})
+    assert len(merged) == len({name for _, name, _ in reports})
 
 
 @given(RELATIONS, RELATIONS)
-def test_excluding_goes_both_ways(first: str, second: str) -> None:
+def test_exclusion_is_symmetric(first: str, second: str) -> None:
     assert excludes(first, second) == excludes(second, first)

@@ -29,7 +29,7 @@ def berthing(now: float, stops_s: float) -> Mask:
 
 
 @pytest.mark.parametrize("stops_s", [STOPS_S, 4.0])
-def test_a_boat_is_alongside_when_it_stops_there(tmp_path: Path, stops_s: float) -> None:
+def test_a_contact_stage_begins_when_the_boat_stops(tmp_path: Path, stops_s: float) -> None:
     mask = partial(berthing, stops_s=stops_s)
     events = watched(tmp_path, BERTH, mask, {"boat": BOAT, "pier": PIER}, UNTIL_S)
     approach, alongside = (first(events, "stage_started", s) for s in ("approach", "alongside"))

@@ -1,4 +1,4 @@
-"""Several tasks: which of them is going on, and that the others are not told about."""
+"""Several tasks: which of them is active; the others are not reported."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def belief(played: ScriptedRun, task: str, time: float | None = None) -> TaskBel
         (PARTS, "leave", Verdict.SUCCEEDED),
     ],
 )
-def test_the_task_that_is_going_on_decides(
+def test_the_active_task_determines_the_verdict(
     spans: tuple[RelationSpan, ...], task: str, verdict: Verdict
 ) -> None:
     played = watch(spans)
@@ -73,7 +73,7 @@ def test_the_task_that_is_going_on_decides(
     assert ends == {(task, str(verdict))}
 
 
-def test_tasks_with_the_same_beginning_are_both_told_of_until_they_differ() -> None:
+def test_tasks_with_the_same_beginning_are_equally_likely_until_they_differ() -> None:
     played = watch(DOCKS)
     early = {t.task: t.active for t in played.at(8.0).tasks}
     assert early["dock"] == pytest.approx(early["inspect"], abs=0.02)
@@ -90,12 +90,12 @@ def test_an_inactive_task_is_not_reported_as_failing() -> None:
         assert not any(o.conditions for o in played.outcomes)
 
 
-def test_what_was_told_to_fail_stays_told_though_another_task_begins() -> None:
+def test_a_reported_failure_is_not_revised_when_another_task_begins() -> None:
     played = watch(FAILS)
     assert belief(played, "leave").active > 0.9
     assert belief(played, "dock").verdict is Verdict.FAILED
-    told = [e.data["stage"] for e in played.events if e.kind == "stage_failing"]
-    assert told == ["captured"]
+    reported = [e.data["stage"] for e in played.events if e.kind == "stage_failing"]
+    assert reported == ["captured"]
 
 
 def test_before_any_observation_no_task_is_reported() -> None:
@@ -105,7 +105,7 @@ def test_before_any_observation_no_task_is_reported() -> None:
     assert played.events == ()
 
 
-def test_what_may_be_asked_for_is_expected_and_what_is_out_of_the_question_is_not() -> None:
+def test_only_relations_of_likely_tasks_are_expected() -> None:
     played = watch(DOCKS)
     expected = {e.relation for t in played.at(8.0).tasks for e in t.expected}
     assert "converging" in expected
@@ -114,13 +114,13 @@ def test_what_may_be_asked_for_is_expected_and_what_is_out_of_the_question_is_no
 
 def test_recognition_and_rejection_of_a_task_are_reported() -> None:
     played = watch(DOCKS)
-    told = [(e.kind, e.data["task"]) for e in played.events if e.kind.startswith("task_")]
-    assert ("task_active", "dock") in told
-    assert ("task_inactive", "inspect") in told
-    assert told.index(("task_active", "inspect")) < told.index(("task_inactive", "inspect"))
+    reported = [(e.kind, e.data["task"]) for e in played.events if e.kind.startswith("task_")]
+    assert ("task_active", "dock") in reported
+    assert ("task_inactive", "inspect") in reported
+    assert reported.index(("task_active", "inspect")) < reported.index(("task_inactive", "inspect"))
 
 
-def test_what_is_told_about_is_followed_in_each_step_and_the_others_at_their_own_pace() -> None:
+def test_reportable_tasks_are_updated_in_each_step_and_others_less_often() -> None:
     minds = play(task_reasoner([DOCK, INSPECT, LEAVE]), Script(DOCKS), 26.0, 25.0).minds
     paces = set()
     for before, mind in pairwise(minds):
@@ -133,6 +133,6 @@ def test_what_is_told_about_is_followed_in_each_step_and_the_others_at_their_own
     assert paces == {UNREPORTED_S}
 
 
-def test_one_task_alone_is_followed_in_each_step() -> None:
+def test_a_single_task_is_updated_in_each_step() -> None:
     for mind in play(task_reasoner([DOCK]), Script(DOCKS), 15.0, 25.0).minds:
         assert mind.memory["tasks"][0].time == mind.time

@@ -1,4 +1,4 @@
-"""When a stage is told to have begun: once something of it is seen, and not before."""
+"""When a stage is reported to have begun: once something of it is observed, and not before."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ def begun(script: Script, text: str, until: float = 14.0) -> dict[str, float]:
     return {str(e.data["stage"]): e.time for e in events if e.kind == "stage_started"}
 
 
-def test_two_that_rest_from_the_start_begin_nothing() -> None:
+def test_objects_at_rest_begin_no_stage() -> None:
     assert begun(Script(), APPROACH) == {}
 
 
 @pytest.mark.parametrize("since", [2.0, 5.5])
-def test_two_that_rest_begin_when_they_near_each_other(since: float) -> None:
+def test_an_approach_begins_when_the_objects_converge(since: float) -> None:
     script = Script((RelationSpan("converging", since, 12.0),))
     assert begun(script, APPROACH)["t"] == pytest.approx(since, abs=0.3)
 
 
-def test_who_comes_later_begins_the_task_by_coming() -> None:
+def test_an_actor_that_enters_later_begins_the_task() -> None:
     objects = {ARM: (0.0, 1e9), SATELLITE: (3.0, 1e9)}
     assert begun(Script(objects=objects), APPROACH)["t"] == pytest.approx(3.0, abs=0.11)
 
 
 def carried(*spans: RelationSpan) -> Script:
-    held = RelationSpan("touching", 2.0, 20.0), RelationSpan("coupled", 2.5, 20.0)
+    hold_spans = RelationSpan("touching", 2.0, 20.0), RelationSpan("coupled", 2.5, 20.0)
     return Script(
-        (RelationSpan("converging", 0.5, 2.0), *held, *spans), THREE, identities=IDENTITIES
+        (RelationSpan("converging", 0.5, 2.0), *hold_spans, *spans), THREE, identities=IDENTITIES
     )
 
 
@@ -47,13 +47,13 @@ actor dish is dish
 """
 
 
-def test_a_stage_of_two_things_begins_with_the_first_that_comes_about() -> None:
+def test_a_stage_of_two_actions_begins_with_the_first_of_them() -> None:
     nears = RelationSpan("converging", 8.0, 12.0, (SATELLITE, INTRUDER))
     script = carried(RelationSpan("moving_together", 5.0, 12.0), nears)
     assert begun(script, CARRY)["carry"] == pytest.approx(5.0, abs=0.4)
 
 
-def test_what_the_stage_before_asked_for_already_does_not_begin_the_next() -> None:
+def test_an_action_of_the_previous_stage_does_not_begin_the_next() -> None:
     text = CARRY.replace("coupled(arm, satellite)", "moving_together(arm, satellite)")
     nears = RelationSpan("converging", 8.0, 12.0, (SATELLITE, INTRUDER))
     script = carried(RelationSpan("moving_together", 3.0, 12.0), nears)
@@ -67,17 +67,17 @@ actor dish is dish
 
 
 @pytest.mark.parametrize("since", [3.0, 6.0])
-def test_a_first_stage_of_two_things_begins_with_what_was_not_so_from_the_start(
+def test_a_first_stage_begins_with_an_action_that_did_not_hold_initially(
     since: float,
 ) -> None:
     """A giver holds its payload all the time: an offer begins when the receiver comes."""
-    held = RelationSpan("touching", 0.0, 20.0), RelationSpan("coupled", 0.5, 20.0)
+    hold_spans = RelationSpan("touching", 0.0, 20.0), RelationSpan("coupled", 0.5, 20.0)
     nears = RelationSpan("converging", since, 12.0, (SATELLITE, INTRUDER))
-    script = Script((*held, nears), THREE, identities=IDENTITIES)
+    script = Script((*hold_spans, nears), THREE, identities=IDENTITIES)
     assert begun(script, OFFER)["t"] == pytest.approx(since, abs=0.4)
 
 
-def test_a_first_stage_of_two_things_begins_with_either_that_comes_about() -> None:
+def test_a_first_stage_of_two_actions_begins_with_either() -> None:
     meets = RelationSpan("touching", 3.0, 20.0), RelationSpan("coupled", 3.5, 20.0)
     nears = RelationSpan("converging", 8.0, 12.0, (SATELLITE, INTRUDER))
     script = Script((*meets, nears), THREE, identities=IDENTITIES)
@@ -87,7 +87,7 @@ def test_a_first_stage_of_two_things_begins_with_either_that_comes_about() -> No
 @pytest.mark.parametrize(
     ("movers", "at"), [((ARM, SATELLITE), 8.0), ((INTRUDER,), 8.0), ((ARM, INTRUDER), 0.1)]
 )
-def test_a_first_stage_of_two_things_begins_as_all_who_come_set_out(
+def test_a_first_stage_begins_when_all_approaching_actors_move(
     monkeypatch: pytest.MonkeyPatch, movers: tuple[int, ...], at: float
 ) -> None:
     """The giver brings its payload; the offer begins when the receiver, who is named first, sets out, too."""
@@ -100,8 +100,8 @@ def test_a_first_stage_of_two_things_begins_as_all_who_come_set_out(
 def dated(script: Script, text: str, until: float = 14.0) -> dict[str, tuple[float, float]]:
     """Stage -> when its beginning was reported, and when it is said to have begun."""
     events = watch(script, until, text).events
-    told = (e for e in events if e.kind == "stage_started")
-    return {str(e.data["stage"]): (e.time, float(e.data["began"])) for e in told}
+    reported = (e for e in events if e.kind == "stage_started")
+    return {str(e.data["stage"]): (e.time, float(e.data["began"])) for e in reported}
 
 
 RETREAT = """
@@ -119,24 +119,24 @@ def retreat(leaves: float) -> Script:
 
 @pytest.mark.parametrize("leaves", [4.0, 6.5])
 def test_a_retreat_is_dated_to_its_onset(leaves: float) -> None:
-    told, began = dated(retreat(leaves), RETREAT)["away"]
-    assert told >= began == pytest.approx(leaves, abs=0.11)
+    reported, began = dated(retreat(leaves), RETREAT)["away"]
+    assert reported >= began == pytest.approx(leaves, abs=0.11)
 
 
 def test_a_contact_is_not_dated_back() -> None:
-    told, began = dated(retreat(6.0), RETREAT)["hold"]
-    assert told == began == pytest.approx(2.2, abs=0.11)
+    reported, began = dated(retreat(6.0), RETREAT)["hold"]
+    assert reported == began == pytest.approx(2.2, abs=0.11)
 
 
 def test_no_stage_is_dated_before_the_one_before_it_or_after_its_report() -> None:
     begins = list(dated(retreat(2.3), RETREAT).values())
-    assert all(began <= told for told, began in begins)
+    assert all(began <= reported for reported, began in begins)
     assert [b for _, b in begins] == sorted(b for _, b in begins)
 
 
-def test_what_lasted_from_before_is_dated_to_the_end_of_the_stage_before_it() -> None:
+def test_a_continuing_action_is_dated_to_the_end_of_the_previous_stage() -> None:
     text = RETREAT.replace("touching(arm, satellite)", "keeping_distance(arm, satellite) for 3 s")
     keeps, drifts = RelationSpan("keeping_distance", 2.0, 9.0), RelationSpan("diverging", 3.0, 12.0)
     script = Script((RelationSpan("converging", 0.5, 2.0), keeps, drifts))
-    told, began = dated(script, text)["away"]
-    assert 5.0 - 0.11 <= began <= told
+    reported, began = dated(script, text)["away"]
+    assert 5.0 - 0.11 <= began <= reported

@@ -46,8 +46,10 @@ def status(played: ScriptedRun, stage: str, time: float | None = None) -> Status
 
 def test_capture_fails_as_in_the_paper() -> None:
     played = watch(Script(FAILS), 30.0)
-    told = [(k, s) for k, s in played.reported() if k not in ("stage_progressing", "stage_failed")]
-    assert told == [
+    reported = [
+        (k, s) for k, s in played.reported() if k not in ("stage_progressing", "stage_failed")
+    ]
+    assert reported == [
         ("stage_started", "approach"),
         ("stage_done", "approach"),
         ("stage_started", "captured"),
@@ -89,26 +91,31 @@ def test_a_stage_wrongly_reported_complete_is_revised() -> None:
         ),
         18.0,
     )
-    told = [e.text.partition(":")[0] for e in played.events if e.data.get("stage") == "captured"]
-    assert told[-2:] == ["Stage `captured` is complete", "Stage `captured` is no longer complete"]
+    reported = [
+        e.text.partition(":")[0] for e in played.events if e.data.get("stage") == "captured"
+    ]
+    assert reported[-2:] == [
+        "Stage `captured` is complete",
+        "Stage `captured` is no longer complete",
+    ]
 
 
-def test_an_aborted_approach_fails_and_never_comes_to_capture() -> None:
+def test_an_aborted_approach_fails_before_the_capture() -> None:
     played = watch(Script(ABORTED), 24.0)
     assert status(played, "captured") is Status.PENDING
     assert finish(task_of(played, 14.0)) is Verdict.FAILED
     assert task_of(played, 14.0).verdict is Verdict.IN_PROGRESS
     assert finish(task_of(played)) is Verdict.FAILED
     assert status(played, "approach", 22.0) in (Status.FAILING, Status.FAILED)
-    concern = next(o for o in played.outcomes if o.mind.time == 15.0).conditions[0]
-    assert (concern.kind, concern.severity, concern.key) == (
+    condition = next(o for o in played.outcomes if o.mind.time == 15.0).conditions[0]
+    assert (condition.kind, condition.severity, condition.key) == (
         "stage_failing",
         Severity.WARNING,
         "dock/approach",
     )
 
 
-def test_what_is_unsafe_interrupts_for_good() -> None:
+def test_an_unsafe_event_interrupts_the_task_permanently() -> None:
     script = Script(SUCCEEDS, objects=CROWDED, alerts=[("unexpected_object", 7.0, 9.0)])
     played = watch(script, 26.0)
     assert task_of(played, 6.8).verdict is Verdict.IN_PROGRESS
@@ -127,7 +134,7 @@ def test_what_is_unsafe_interrupts_for_good() -> None:
         ("collision_course", ARM, False),  # whoever it was, it was unsafe
     ],
 )
-def test_a_stranger_that_proves_to_be_an_actor_interrupts_no_longer(
+def test_an_unknown_object_identified_as_an_actor_no_longer_interrupts(
     kind: str, about: int, ends: bool
 ) -> None:
     script = Script(SUCCEEDS, objects=CROWDED, alerts=[(kind, 7.0, 9.0)], about=(about,))
@@ -144,7 +151,7 @@ def test_other_alerts_do_not_interrupt(kind: str) -> None:
     assert task_of(played).verdict is Verdict.SUCCEEDED
 
 
-def test_a_task_of_which_nothing_is_seen_is_unknown() -> None:
+def test_the_verdict_on_an_unobserved_task_is_unknown() -> None:
     alone = Script(objects={INTRUDER: (0.0, 1e9)})
     played = watch(alone, 10.0)
     assert finish(task_of(played)) is Verdict.UNKNOWN
@@ -153,12 +160,12 @@ def test_a_task_of_which_nothing_is_seen_is_unknown() -> None:
     assert finish(task_of(still)) is Verdict.UNKNOWN
 
 
-def test_a_task_that_still_goes_on_at_the_end_is_in_progress() -> None:
+def test_a_task_that_is_unfinished_at_the_end_is_in_progress() -> None:
     played = watch(Script(FAILS), 10.0)
     assert finish(task_of(played)) is Verdict.IN_PROGRESS
 
 
-def test_what_is_not_seen_is_unknown_and_never_a_failure() -> None:
+def test_hidden_actors_make_a_stage_unknown_and_never_failed() -> None:
     hidden = Script(SUCCEEDS, hidden={SATELLITE: (4.0, 9.0)})
     played = watch(hidden, 26.0)
     assert status(played, "approach", 5.0) is Status.PROGRESSING
@@ -168,7 +175,7 @@ def test_what_is_not_seen_is_unknown_and_never_a_failure() -> None:
     assert task_of(played).verdict is Verdict.SUCCEEDED
 
 
-def test_an_approach_without_progress_is_stalled_and_goes_on() -> None:
+def test_an_approach_without_progress_is_stalled_and_can_continue() -> None:
     spans = (
         RelationSpan("converging", 0, 5),
         RelationSpan("converging", 11, 15),
@@ -180,7 +187,7 @@ def test_an_approach_without_progress_is_stalled_and_goes_on() -> None:
     assert status(played, "approach") is Status.DONE
 
 
-def test_a_short_contrary_is_no_failure_and_a_recovery_ends_one() -> None:
+def test_brief_contrary_motion_is_no_failure_and_a_recovery_ends_one() -> None:
     brief = (
         RelationSpan("converging", 0, 5),
         RelationSpan("diverging", 5, 5.4),
@@ -198,7 +205,7 @@ def test_a_short_contrary_is_no_failure_and_a_recovery_ends_one() -> None:
     assert finish(task_of(played)) is Verdict.IN_PROGRESS
 
 
-def test_what_has_failed_goes_on_only_when_it_went_well_for_as_long() -> None:
+def test_a_failed_stage_recovers_only_after_as_long_a_success() -> None:
     spans = (
         RelationSpan("converging", 0, 5),
         RelationSpan("diverging", 5, 15),
@@ -224,14 +231,16 @@ def bobbing(nearest: float) -> Script:
 
 
 @pytest.mark.parametrize(("nearest", "mended"), [(36.0, False), (24.0, False), (8.0, True)])
-def test_who_has_parted_recovers_by_coming_back_half_the_way(nearest: float, mended: bool) -> None:
+def test_a_separation_is_recovered_by_returning_half_the_distance(
+    nearest: float, mended: bool
+) -> None:
     berth = "<t> ::= <near> <stay>\n<near> ::= converging(arm, satellite)\n"
     played = watch(bobbing(nearest), 14.0, berth + "<stay> ::= touching(arm, satellite) for 5 s")
     assert status(played, "stay", 9.5) is Status.FAILING
     assert (status(played, "stay") is Status.PROGRESSING) is mended
 
 
-def test_a_capture_that_is_lost_at_once_is_no_success() -> None:
+def test_a_capture_that_is_lost_immediately_fails() -> None:
     lost = (
         RelationSpan("converging", 0, 12),
         RelationSpan("touching", 12, 14.5),
@@ -244,7 +253,7 @@ def test_a_capture_that_is_lost_at_once_is_no_success() -> None:
     assert status(played, "captured", 16.0) is Status.FAILING
 
 
-def test_what_the_stage_asks_for_is_expected_and_so_is_the_entry_to_the_next() -> None:
+def test_relations_of_the_current_and_next_stage_are_expected() -> None:
     played = watch(Script(SUCCEEDS), 20.0)
     pair = (ARM, SATELLITE)
     early = set(task_of(played, 5.0).expected)
@@ -256,7 +265,7 @@ def test_what_the_stage_asks_for_is_expected_and_so_is_the_entry_to_the_next() -
 RETRY = load_task("dock_with_retry")
 
 
-def test_a_task_that_allows_a_retry_takes_a_retreat_for_one() -> None:
+def test_a_retreat_is_a_retry_if_the_task_allows_it() -> None:
     played = play(task_reasoner([RETRY]), Script(RETRIES), 30.0)
     assert task_of(played).verdict is Verdict.SUCCEEDED
     assert "stage_failing" not in dict(played.reported())
@@ -265,7 +274,7 @@ def test_a_task_that_allows_a_retry_takes_a_retreat_for_one() -> None:
     assert finish(task_of(watch(Script(RETRIES), 20.0))) is not Verdict.SUCCEEDED
 
 
-def test_an_actor_does_not_change_hands_in_a_moment() -> None:
+def test_actors_are_rebound_only_after_a_while() -> None:
     reasoner = task_reasoner([DOCK])
     played = play(reasoner, Script(SUCCEEDS), 5.0)
     swapped = Script(SUCCEEDS, identities={ARM: {"satellite": 0.9}, SATELLITE: {"arm": 0.9}})
@@ -296,10 +305,10 @@ def test_shifting_a_scene_in_time_shifts_its_events(name: str, shift: float) -> 
     shift = round(shift, 1)
     moved = tuple(replace(s, from_s=s.from_s + shift, to_s=s.to_s + shift) for s in spans)
     objects = {ARM: (shift, 1e9), SATELLITE: (shift, 1e9)}
-    one = watched(name)
-    other = watch(Script(moved, objects=objects), until + shift, fps=10.0)
-    assert other.reported() == one.reported()
-    for a, b in zip(one.events, other.events, strict=True):
+    original = watched(name)
+    shifted = watch(Script(moved, objects=objects), until + shift, fps=10.0)
+    assert shifted.reported() == original.reported()
+    for a, b in zip(original.events, shifted.events, strict=True):
         assert b.time - a.time == pytest.approx(shift, abs=0.11)
 
 
@@ -319,7 +328,7 @@ def test_a_reasoner_is_a_pure_function_without_state() -> None:
     hash(played.last.memory["tasks"][0].posterior.likeliest.state)
 
 
-def test_several_tasks_are_supervised_side_by_side() -> None:
+def test_several_tasks_are_supervised_concurrently() -> None:
     played = play(task_reasoner([DOCK, RETRY]), Script(RETRIES), 30.0)
     assert [t.task for t in played.last.tasks] == ["dock", "dock_with_retry"]
     assert played.last.tasks[1].verdict is Verdict.SUCCEEDED
@@ -331,8 +340,8 @@ def test_occasionally_wrong_relations_do_not_change_the_verdict(share: float) ->
         for name, (spans, until) in SCENES.items():
             noisy = _with_noise(spans, until, share, seed)
             verdict = finish(task_of(watch(Script(noisy), until)))
-            wanted = Verdict.SUCCEEDED if name == "succeeds" else Verdict.FAILED
-            assert verdict is wanted, (name, seed)
+            expected = Verdict.SUCCEEDED if name == "succeeds" else Verdict.FAILED
+            assert verdict is expected, (name, seed)
 
 
 def _with_noise(

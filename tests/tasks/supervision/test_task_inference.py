@@ -26,21 +26,23 @@ ONE = frozenset({1})
 
 @given(evidences, st.booleans())
 def test_shares_are_the_posterior(evidence: list[float], none: bool) -> None:
-    found = shares(evidence, none)
+    result = shares(evidence, none)
     idle = IDLE * len(evidence) if none else 0.0
-    whole = sum(math.exp(e) for e in evidence) + idle
-    assert found == pytest.approx([math.exp(e) / whole for e in evidence])
+    total = sum(math.exp(e) for e in evidence) + idle
+    assert result == pytest.approx([math.exp(e) / total for e in evidence])
 
 
 @given(evidences, st.integers(0, 4), st.floats(0.1, 5))
-def test_more_evidence_makes_a_task_likelier(evidence: list[float], at: int, more: float) -> None:
-    at %= len(evidence)
-    better = [e + more * (k == at) for k, e in enumerate(evidence)]
-    assert shares(better, none=True)[at] > shares(evidence, none=True)[at]
+def test_more_evidence_makes_a_task_likelier(
+    evidence: list[float], index: int, more: float
+) -> None:
+    index %= len(evidence)
+    better = [e + more * (k == index) for k, e in enumerate(evidence)]
+    assert shares(better, none=True)[index] > shares(evidence, none=True)[index]
 
 
 @given(casts)
-def test_rivals_are_those_linked_by_objects(cast: list[frozenset[int]]) -> None:
+def test_rivals_are_tasks_connected_by_common_objects(cast: list[frozenset[int]]) -> None:
     groups = list(rivals(cast))
     assert sorted(k for g in groups for k in g) == list(range(len(cast)))
     home = {k: g for g in groups for k in g}
@@ -48,24 +50,26 @@ def test_rivals_are_those_linked_by_objects(cast: list[frozenset[int]]) -> None:
         for b, second in enumerate(cast):
             assert not first & second or home[a] == home[b]
     for group in groups:
-        seen = {group[0]}
+        connected = {group[0]}
         for _ in group:
-            seen |= {k for k in group if any(cast[k] & cast[s] for s in seen)}
-        assert seen == set(group)
+            connected |= {k for k in group if any(cast[k] & cast[s] for s in connected)}
+        assert connected == set(group)
 
 
 @given(st.floats(-99, 99), st.floats(0, 9))
-def test_a_task_that_is_alone_is_going_on(gain: float, dt: float) -> None:
+def test_a_single_task_is_active(gain: float, dt: float) -> None:
     assert updated_activities([TaskActivity()], [gain], [ONE], dt) == (ALONE,)
 
 
-def test_of_two_tasks_neither_is_believed_before_anything_is_seen() -> None:
-    found = updated_activities([TaskActivity(), TaskActivity()], [0.0, 0.0], [ONE, ONE], 0.1)
-    assert [a.reportable for a in found] == [False, False]
+def test_without_evidence_neither_of_two_tasks_is_reported() -> None:
+    activities = updated_activities([TaskActivity(), TaskActivity()], [0.0, 0.0], [ONE, ONE], 0.1)
+    assert [a.reportable for a in activities] == [False, False]
 
 
 @given(st.lists(st.tuples(st.floats(-2, 2), st.floats(-2, 2)), min_size=1, max_size=60))
-def test_once_a_task_was_believed_one_of_its_rivals_is(gains: list[tuple[float, float]]) -> None:
+def test_once_a_task_is_reported_one_of_its_rivals_stays_so(
+    gains: list[tuple[float, float]],
+) -> None:
     now: tuple[TaskActivity, ...] = (TaskActivity(), TaskActivity())
     for pair in gains:
         before = now
@@ -77,7 +81,7 @@ def test_once_a_task_was_believed_one_of_its_rivals_is(gains: list[tuple[float, 
         assert now[0].begun == (before[0].begun or sum(a.chance for a in now) >= SURE)
 
 
-def test_a_rival_that_explains_what_is_seen_takes_over() -> None:
+def test_a_rival_that_explains_the_observations_takes_over() -> None:
     now: tuple[TaskActivity, ...] = (TaskActivity(), TaskActivity())
     for _ in range(20):
         now = updated_activities(now, [0.5, 0.5], [ONE, ONE], 0.2)
@@ -87,7 +91,7 @@ def test_a_rival_that_explains_what_is_seen_takes_over() -> None:
     assert [a.reportable for a in now] == [False, True]
 
 
-def test_what_no_rival_explains_is_a_failure_and_not_another_task() -> None:
+def test_evidence_that_no_rival_explains_does_not_change_the_task() -> None:
     now: tuple[TaskActivity, ...] = (TaskActivity(MOST, 0.5, True), TaskActivity(MOST, 0.5, True))
     for _ in range(50):
         now = updated_activities(now, [-0.5, -0.1], [ONE, ONE], 0.1)

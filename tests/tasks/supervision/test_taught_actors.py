@@ -62,7 +62,9 @@ def test_an_actor_is_the_taught_object_of_its_name_by_default(
     assert with_taught_actors(tasks, given, (), ()) == given
 
 
-def test_it_is_told_and_recorded(database: ModelDatabase, tmp_path: Path) -> None:
+def test_the_default_model_is_reported_and_recorded(
+    database: ModelDatabase, tmp_path: Path
+) -> None:
     task = tmp_path / "inspect.task"
     task.write_text(TASK.format(declared="actor station is trex"))
     clip = write_clip(tmp_path / "clip.avi", 3)

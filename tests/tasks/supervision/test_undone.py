@@ -67,7 +67,7 @@ def failing(script: Script, text: str) -> set[str]:
         (math.nan, True, True),
     ],
 )
-def test_who_is_in_contact_recedes_from_nobody(gap: float, contact: bool, fails: bool) -> None:
+def test_objects_in_contact_do_not_diverge(gap: float, contact: bool, fails: bool) -> None:
     later = Truth.TRUE if contact else Truth.UNKNOWN
     meets = RelationSpan("in_contact", 2.0, 3.0), RelationSpan("in_contact", 3.0, 20.0, truth=later)
     spans = (*MEETS, *meets, RelationSpan("diverging", 4.0, 9.0))
@@ -84,11 +84,11 @@ def test_who_is_in_contact_recedes_from_nobody(gap: float, contact: bool, fails:
         (0.0, True, "grasp"),  # a second try is another grasp
     ],
 )
-def test_a_grasp_that_takes_nothing_along_was_none(moved_s: float, again: bool, fails: str) -> None:
-    held = RelationSpan("touching", 2.0, 6.0), RelationSpan("coupled", 2.5, 6.0)
+def test_a_grasp_without_motion_of_the_part_fails(moved_s: float, again: bool, fails: str) -> None:
+    hold_spans = RelationSpan("touching", 2.0, 6.0), RelationSpan("coupled", 2.5, 6.0)
     spans: tuple[RelationSpan, ...] = (
         RelationSpan("converging", 0.5, 2.0),
-        *held,
+        *hold_spans,
         RelationSpan("diverging", 6.0, 9.0),
     )
     spans += (RelationSpan("moving_together", 6.0 - moved_s, 6.0),) if moved_s else ()
@@ -107,14 +107,16 @@ def test_a_grasp_that_takes_nothing_along_was_none(moved_s: float, again: bool, 
         (1.5, "lift"),
     ],
 )
-def test_what_moves_without_its_gripper_was_not_taken_along(together_s: float, fails: str) -> None:
+def test_a_part_that_moves_without_its_gripper_was_not_grasped(
+    together_s: float, fails: str
+) -> None:
     lift = "moving_together(arm, satellite) & converging(satellite, dish)\n  fails"
     text = LIFT.replace("moving_together(arm, satellite) fails", lift)
     nears = RelationSpan("converging", 4.5, 12.0, (SATELLITE, INTRUDER))
-    held = RelationSpan("touching", 2.0, 6.0), RelationSpan("coupled", 2.5, 6.0)
+    hold_spans = RelationSpan("touching", 2.0, 6.0), RelationSpan("coupled", 2.5, 6.0)
     spans: tuple[RelationSpan, ...] = (
         RelationSpan("converging", 0.5, 2.0),
-        *held,
+        *hold_spans,
         RelationSpan("diverging", 6.0, 9.0),
     )
     spans += (RelationSpan("moving_together", 6.0 - together_s, 6.0),) if together_s else ()
@@ -131,7 +133,7 @@ def test_what_moves_without_its_gripper_was_not_taken_along(together_s: float, f
         (("gripper", "part"), ("part",), True),
     ],
 )
-def test_what_two_do_together_does_not_begin_by_one_of_them_alone(
+def test_a_joint_action_does_not_begin_with_one_actor_alone(
     going: tuple[str, ...], waiting: tuple[str, ...], begun: bool, first: bool
 ) -> None:
     monitor = entered(4.0)
@@ -143,7 +145,7 @@ def test_what_two_do_together_does_not_begin_by_one_of_them_alone(
     assert status is (Status.PROGRESSING if begun else Status.ACTIVE)
 
 
-def test_what_goes_wrong_with_another_one_undoes_no_grasp() -> None:
+def test_a_failure_with_a_third_object_undoes_no_grasp() -> None:
     text = LIFT.split("<lift>  ::=")[0] + "<lift>  ::= converging(satellite, dish)\n"
     text = f"actor dish is dish{text}"
     goes = (
@@ -159,7 +161,7 @@ def started(script: Script) -> set[str]:
     return {str(e.data["stage"]) for e in events if e.kind == "stage_started"}
 
 
-def test_after_a_broken_invariant_no_stage_goes_on() -> None:
+def test_after_a_broken_invariant_no_stage_begins() -> None:
     captured = (
         RelationSpan("converging", 0.5, 8.0),
         RelationSpan("touching", 8.0, 20.0),
@@ -176,7 +178,7 @@ def test_after_a_broken_invariant_no_stage_goes_on() -> None:
     assert started(alarmed) == {"approach", "captured"}
 
 
-def test_who_carries_something_there_is_expected_there() -> None:
+def test_a_carrier_is_expected_at_the_destination_of_its_load() -> None:
     moves = RelationSpan("moving_together", 4.0, 12.0), RelationSpan("coupled", 2.5, 20.0)
     nears = RelationSpan("converging", 5.0, 12.0, (SATELLITE, INTRUDER))
     played = watch(Script((*MEETS, *moves, nears), THREE, identities=IDENTITIES), 10.0, CARRY)
@@ -185,7 +187,7 @@ def test_who_carries_something_there_is_expected_there() -> None:
     assert Expectation("converging", (SATELLITE, INTRUDER)) in task_of(played, 8.0).expected
 
 
-def test_only_carriers_come_along() -> None:
+def test_only_carriers_are_expected_with_their_load() -> None:
     nears = (("part", "tray"), ("converging",))
     assert list(brought_along([nears])) == []
     assert list(brought_along([(("arm", "part"), ("touching",)), nears])) == []
@@ -196,7 +198,7 @@ def test_only_carriers_come_along() -> None:
 
 
 @pytest.mark.parametrize(
-    ("held", "name", "strange"),
+    ("coupled", "name", "unexplained"),
     [
         ((), "", True),
         ((ARM, INTRUDER), "", False),  # the rest of the arm, or who hands it something
@@ -204,17 +206,17 @@ def test_only_carriers_come_along() -> None:
         ((INTRUDER, 9), "", True),  # it holds something else
     ],
 )
-def test_an_unknown_that_once_held_an_actor_stays_explained(
-    held: tuple[int, int] | tuple[()], name: str, strange: bool
+def test_an_unknown_object_that_once_held_an_actor_stays_explained(
+    coupled: tuple[int, int] | tuple[()], name: str, unexplained: bool
 ) -> None:
     reasoner = task_reasoner([parse_task(CAPTURE)])
 
     def think(before: Mind, observation: Observation) -> Outcome:
-        couplings = (Coupling(held, 3.0),) if held and 3.0 <= before.time < 5.0 else ()
+        couplings = (Coupling(coupled, 3.0),) if coupled and 3.0 <= before.time < 5.0 else ()
         return reasoner(replace(before, couplings=couplings), observation)
 
     names = {k: v for k, v in IDENTITIES.items() if k != INTRUDER} | (
         {INTRUDER: {name: 0.9}} if name else {}
     )
     script = Script(MEETS, objects=THREE | {INTRUDER: (2.0, 1e9)}, identities=names)
-    assert (INTRUDER in task_of(play(think, script, 8.0)).unexplained) is strange
+    assert (INTRUDER in task_of(play(think, script, 8.0)).unexplained) is unexplained

@@ -44,8 +44,14 @@ def charged(folder: Path, text: str, *, turns_back: bool) -> list[Event]:
 
 def driving(now: float, *, turns_back: bool) -> Mask:
     """A vehicle that drives past a charger below it, or back again before it."""
-    there = 170.0 if turns_back else 400.0
-    x = eased(now, (0.5, 20.0), (3.5, there), (3.6, there), (6.0, 40.0 if turns_back else there))
+    turning_point = 170.0 if turns_back else 400.0
+    x = eased(
+        now,
+        (0.5, 20.0),
+        (3.5, turning_point),
+        (3.6, turning_point),
+        (6.0, 40.0 if turns_back else turning_point),
+    )
     return drawn({CHARGER: (240, 140, 50, 70), VEHICLE: (x, 80, 60, 45)})
 
 
@@ -53,7 +59,7 @@ def driving(now: float, *, turns_back: bool) -> Mask:
     ("turns_back", "fails", "not_fails"),
     [(False, "docked", "approach"), (True, "approach", "docked")],
 )
-def test_who_goes_past_fails_to_dock_and_who_turns_back_to_approach(
+def test_driving_past_fails_docking_and_turning_back_fails_the_approach(
     tmp_path: Path, turns_back: bool, fails: str, not_fails: str
 ) -> None:
     events = charged(tmp_path, CHARGE, turns_back=turns_back)
@@ -68,7 +74,7 @@ def alongside(now: float) -> Mask:
     return drawn({CHARGER: (120, 150, 240, 40), VEHICLE: (x, y, 50, 40)})
 
 
-def test_who_passes_along_what_it_should_reach_has_begun_to_dock_and_fails_there(
+def test_passing_along_the_goal_begins_docking_and_fails_it(
     tmp_path: Path,
 ) -> None:
     roles = {"vehicle": VEHICLE, "charger": CHARGER}
@@ -83,7 +89,7 @@ def test_who_passes_along_what_it_should_reach_has_begun_to_dock_and_fails_there
     assert first(events, "stage_failing", "approach") is None
 
 
-def test_an_approach_that_must_last_fails_where_one_goes_past_too_soon(tmp_path: Path) -> None:
+def test_driving_past_too_soon_fails_an_approach_with_a_duration(tmp_path: Path) -> None:
     text = CHARGE.replace("converging(vehicle, charger)", "converging(vehicle, charger) for 4 s")
     events = charged(tmp_path, text, turns_back=False)
     assert first(events, "stage_started", "docked") is None
@@ -108,7 +114,7 @@ def carrying(now: float, *, drops: bool) -> Mask:
 @pytest.mark.parametrize(
     ("drops", "fails", "not_fails"), [(False, "place", "carry"), (True, "carry", "place")]
 )
-def test_what_is_put_down_elsewhere_is_not_placed_and_what_is_dropped_not_carried(
+def test_putting_down_elsewhere_fails_placing_and_dropping_fails_carrying(
     tmp_path: Path, drops: bool, fails: str, not_fails: str
 ) -> None:
     events = watched(
@@ -137,7 +143,7 @@ def riding(now: float, *, stops: bool) -> Mask:
 
 
 @pytest.mark.parametrize(("stops", "binned"), [(False, True), (True, False)])
-def test_what_vanishes_into_where_it_came_has_got_there(
+def test_an_object_that_vanishes_into_its_goal_has_reached_it(
     tmp_path: Path, stops: bool, binned: bool
 ) -> None:
     roles = {"parcel": 1, "bin": 2}

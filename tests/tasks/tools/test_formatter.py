@@ -46,9 +46,7 @@ def scattered(text: str, seed: int) -> tuple[str, list[str]]:
 
 @LAW
 @given(tasks, st.integers(0, 10**6))
-def test_the_layout_is_stable_and_changes_neither_meaning_nor_comments(
-    task: Task, seed: int
-) -> None:
+def test_formatting_is_idempotent_and_keeps_meaning_and_comments(task: Task, seed: int) -> None:
     text, comments = scattered(str(task), seed)
     once = formatted(text)
     assert read(once) == read(text)
@@ -59,7 +57,7 @@ def test_the_layout_is_stable_and_changes_neither_meaning_nor_comments(
 
 
 @pytest.mark.parametrize("name", shipped_tasks())
-def test_shipped_tasks_are_laid_out(name: str) -> None:
+def test_shipped_tasks_are_formatted(name: str) -> None:
     assert formatted(read_text(name)) == read_text(name)
 
 
@@ -69,7 +67,7 @@ def test_good_files_keep_their_meaning(path: str) -> None:
     assert read(formatted(text)) == read(text)
 
 
-def test_long_rules_are_broken_and_comments_stay_where_they_belong() -> None:
+def test_long_lines_are_broken_and_comments_stay_with_their_lines() -> None:
     long = " | ".join(f"<stage_{i}>" for i in range(20))
     text = f"# about\n\n\n\n<t>::={long} # why\n   # before b\n<b>::= x(a , c) for 5s"
     out = formatted(text).split("\n")

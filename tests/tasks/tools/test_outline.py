@@ -30,7 +30,7 @@ def walk(branch: Branch) -> Iterator[Branch]:
 
 
 @pytest.mark.parametrize("text", [RETRY, STRICT])
-def test_every_stage_is_drawn_once_and_named_where_it_comes_again(text: str) -> None:
+def test_every_stage_is_expanded_once(text: str) -> None:
     task = parse_task(text)
     stages = [b for b in walk(outline(task)) if b.kind == "stage"]
     opened = [b.text for b in stages if not b.again]
@@ -39,7 +39,7 @@ def test_every_stage_is_drawn_once_and_named_where_it_comes_again(text: str) -> 
     assert all(not b.inside for b in stages if b.again)
 
 
-def test_a_tree_reads_as_the_task_does() -> None:
+def test_a_tree_shows_the_structure_of_the_task() -> None:
     def lines(branch: Branch, depth: int = 0) -> Iterator[str]:
         yield "  " * depth + branch.text
         for inner in branch.inside:
@@ -61,6 +61,8 @@ def test_a_tree_reads_as_the_task_does() -> None:
     ]
 
 
-def test_what_an_action_is_asked_by_stands_at_it() -> None:
-    found = {b.text: b.stage for b in walk(outline(parse_task(STRICT))) if b.kind == "actor"}
-    assert found == {"arm": "coupled", "satellite": "coupled"}
+def test_clauses_are_children_of_their_action() -> None:
+    stages_by_actor = {
+        b.text: b.stage for b in walk(outline(parse_task(STRICT))) if b.kind == "actor"
+    }
+    assert stages_by_actor == {"arm": "coupled", "satellite": "coupled"}

@@ -23,7 +23,7 @@ def text(task: str, count: int) -> list[tuple[tuple[str, ...], ...]]:
     return list(islice(traces(parse_task(task)), count))
 
 
-def test_courses_are_listed_short_ones_first() -> None:
+def test_sequences_are_listed_shortest_first() -> None:
     found = list(islice(traces(load_task("dock_with_retry")), 3))
     assert [len(c) for c in found] == [2, 4, 6]
     assert found[0] == (
@@ -44,17 +44,17 @@ def test_courses_are_listed_short_ones_first() -> None:
         ("gap(a, b) < 5 px seen(a)", 1),
     ],
 )
-def test_every_legal_course_is_listed_once(course: str, count: int) -> None:
+def test_every_legal_sequence_is_listed_once(course: str, count: int) -> None:
     assert len(text(f"<t> ::= {course}", 50)) == count
 
 
-def test_an_optional_actor_may_be_passed_over() -> None:
+def test_stages_of_an_optional_actor_can_be_skipped() -> None:
     assert len(text("optional actor b\n<t> ::= seen(a) seen(b)", 9)) == 2
 
 
 @settings(max_examples=40, deadline=None)
 @given(small, st.integers(0, 10**6))
-def test_a_course_drawn_at_random_is_among_those_listed(course: Course, seed: int) -> None:
+def test_a_random_sequence_is_among_those_listed(course: Course, seed: int) -> None:
     task = Task((Stage("t", course),))
     drawn, ended = sample(task, Random(seed))
     assert ended
@@ -62,7 +62,7 @@ def test_a_course_drawn_at_random_is_among_those_listed(course: Course, seed: in
         assert drawn in takewhile(lambda c: len(c) <= len(drawn), traces(task))
 
 
-def test_walking_offers_what_may_come_next_and_the_end() -> None:
+def test_successors_include_the_end() -> None:
     task = load_task("dock")
     (first,) = initial_positions(task)
     (second,) = successors(task, first)
@@ -72,7 +72,7 @@ def test_walking_offers_what_may_come_next_and_the_end() -> None:
     assert successors(task, end) == ()
 
 
-def test_the_command_walks_lists_and_draws() -> None:
+def test_the_command_walks_lists_and_samples() -> None:
     walked = runner.invoke(app, ["simulate", "dock"], input="1\nx\n1\n\n")
     assert walked.exit_code == 0
     assert "a number from 1 to 1, or q" in walked.output
@@ -89,7 +89,7 @@ def test_the_command_walks_lists_and_draws() -> None:
 
 
 @pytest.mark.parametrize("name", shipped_tasks())
-def test_every_arrow_of_a_picture_joins_its_boxes(name: str) -> None:
+def test_every_edge_of_a_diagram_connects_its_nodes(name: str) -> None:
     flow = flow_of(load_task(name))
     ends = {"start", "finish", *flow.nodes}
     assert all(a in ends and b in ends for a, b in flow.edges)
@@ -100,11 +100,11 @@ def test_every_arrow_of_a_picture_joins_its_boxes(name: str) -> None:
             reached.add(node)
             todo += [b for a, b in flow.edges if a == node]
     assert reached == ends
-    for said, made in product(flow.nodes, (mermaid(flow), dot(flow))):
-        assert f"    {said} [" in made or f"    {said}[" in made
+    for node_name, diagram in product(flow.nodes, (mermaid(flow), dot(flow))):
+        assert f"    {node_name} [" in diagram or f"    {node_name}[" in diagram
 
 
-def test_the_command_shows_pictures_and_lays_out_files(tmp_path: Path) -> None:
+def test_the_commands_draw_diagrams_and_format_files(tmp_path: Path) -> None:
     assert runner.invoke(app, ["show", "dock", "--format", "mermaid"]).output.startswith(
         "flowchart"
     )
@@ -121,16 +121,16 @@ def test_the_command_shows_pictures_and_lays_out_files(tmp_path: Path) -> None:
     assert "[E102]" in str(bad.exception)
 
 
-def test_the_command_explains_and_lists_actions() -> None:
+def test_the_commands_explain_codes_and_list_actions() -> None:
     assert runner.invoke(app, ["explain", "E102"]).output.startswith("E102: ")
     listed = runner.invoke(app, ["actions"]).output
-    for words in (
+    for text in (
         "coupled(a, b)",
         "gap(a, b) < 5 px",
         "time_to_contact(a, b) < 5 s",
         "inside(a, zone)",
     ):
-        assert words in listed
+        assert text in listed
     assert '"coupled"' in runner.invoke(app, ["actions", "--json"]).output
     assert "no kind of percept" in str(
         runner.invoke(app, ["check", "dock", "--without", "x"]).exception
