@@ -10,7 +10,7 @@ from visup.console.feedback import Opinion, store_feedback
 from visup.evaluation.feedback import evaluate_feedback
 
 
-def test_what_people_said_is_counted_over_all_runs(tmp_path: Path) -> None:
+def test_feedback_is_counted_over_all_readable_runs(tmp_path: Path) -> None:
     for name in ("one", "two"):
         record(tmp_path / name, meeting())
     (tmp_path / "damaged").mkdir()

@@ -1,4 +1,4 @@
-"""The evaluation of damaged files finds what is wrong, and nothing is."""
+"""The evaluation of damaged files detects every kind of failure, and finds none in visup."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def test_damaged_files_are_read_or_refused_within_bounds() -> None:
     assert figures["total"]["cuts"] in (0, 20)  # none without a C compiler
 
 
-def test_journals_whose_content_is_odd_are_read_or_refused() -> None:
+def test_journals_of_odd_content_are_read_or_refused() -> None:
     kinds = ["journals", "journals of other content", "resumed journals"]
     figures = evaluate_hardening(count=8, seed=12, races=0, cuts=0, kind=kinds)
     assert figures["failures"] == []
@@ -46,7 +46,7 @@ def test_an_unknown_kind_is_refused() -> None:
         evaluate_hardening(count=1, cuts=0, kind=["spoons"])
 
 
-def read_of(number: int) -> None:
+def misbehave(number: int) -> None:
     match number:
         case 1:
             raise SourceError("refused")
@@ -62,7 +62,7 @@ def read_of(number: int) -> None:
             os._exit(3)
 
 
-def test_whatever_goes_wrong_is_found(tmp_path: Path) -> None:
+def test_every_kind_of_failure_is_detected(tmp_path: Path) -> None:
     """Without this the tests above could not fail."""
 
     def make(folder: Path, rng: random.Random) -> None:
@@ -74,20 +74,20 @@ def test_whatever_goes_wrong_is_found(tmp_path: Path) -> None:
         if number == 7:
             signal.raise_signal(signal.SIGALRM)  # the time is over when all is done
 
-    subject = Subject(make, lambda folder: read_of(int((folder / "n").read_text())))
-    found = fuzz(subject, 9, 0, tmp_path)
-    assert found.outcomes == {
+    subject = Subject(make, lambda folder: misbehave(int((folder / "n").read_text())))
+    result = fuzz(subject, 9, 0, tmp_path)
+    assert result.outcomes == {
         "read": 1, "refused": 1, "raised": 2, "crashed": 2, "memory": 1, "ran": 1, "slow": 1
     }  # fmt: skip
-    assert len(found.failures) == 7
-    said = "\n".join(found.failures)
-    assert "3: crashed by SIGABRT" in said
-    assert "8: crashed with the exit code 3" in said
-    assert "it cannot be made" in said
+    assert len(result.failures) == 7
+    failures = "\n".join(result.failures)
+    assert "3: crashed by SIGABRT" in failures
+    assert "8: crashed with the exit code 3" in failures
+    assert "it cannot be made" in failures
 
 
-def test_the_same_seed_damages_in_the_same_way() -> None:
+def test_mutations_depend_only_on_the_seed() -> None:
     seeds = [b"gap(a, b) < 20 px", b"0123456789" * 9]
-    once, twice = ([mutated(seeds, random.Random(n)) for n in range(200)] for _ in range(2))
-    assert once == twice
-    assert len(set(once)) > 150
+    first, second = ([mutated(seeds, random.Random(n)) for n in range(200)] for _ in range(2))
+    assert first == second
+    assert len(set(first)) > 150

@@ -1,4 +1,4 @@
-"""Worker processes give what this process would, and end with it."""
+"""Worker processes give the same results as a single process, and end with their parent."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ def square(n: int) -> int:
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_processes_give_what_this_one_would(workers: int) -> None:
-    found = dict(each_in_processes(square, range(7), workers))
-    assert found == {n: n * n for n in range(7)}
+def test_results_do_not_depend_on_the_number_of_workers(workers: int) -> None:
+    results = dict(each_in_processes(square, range(7), workers))
+    assert results == {n: n * n for n in range(7)}
 
 
 _PREPARED: list[int] = []

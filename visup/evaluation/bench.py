@@ -33,15 +33,15 @@ def main() -> int:
         0 if all ran and met their bars, else 1; evaluations without data are skipped.
     """
     parser = argparse.ArgumentParser(description=main.__doc__)
-    beside = Path.cwd().parent / "shared" / "data"
-    parser.add_argument("--data", type=Path, default=beside, help="folder with the data")
+    default_folder = Path.cwd().parent / "shared" / "data"
+    parser.add_argument("--data", type=Path, default=default_folder, help="folder with the data")
     parser.add_argument("--out", type=Path, default=Path("runs/bench"), help="folder for JSON")
     parser.add_argument("--only", help="only evaluations whose name contains this")
-    given = parser.parse_args()
-    given.out.mkdir(parents=True, exist_ok=True)
+    arguments = parser.parse_args()
+    arguments.out.mkdir(parents=True, exist_ok=True)
     # These need no data.
     results = [
-        _run(kind, None, given.out)
+        _run(kind, None, arguments.out)
         for kind in (
             "clips",
             "random",
@@ -57,28 +57,37 @@ def main() -> int:
             "soak",
             "stepping",
         )
-        if (given.only or "") in kind
+        if (arguments.only or "") in kind
     ]
-    if not given.data.is_dir():
-        echo(f"no data at {given.data}: nothing else to measure (see --data)")
+    if not arguments.data.is_dir():
+        echo(f"no data at {arguments.data}: nothing else to measure (see --data)")
     results += [
-        _run(kind, given.data / folder, given.out)
+        _run(kind, arguments.data / folder, arguments.out)
         for kind, folder in EVALUATIONS
-        if (given.only or "") in f"{kind} {folder}" and (given.data / folder).is_dir()
+        if (arguments.only or "") in f"{kind} {folder}" and (arguments.data / folder).is_dir()
     ]
     return int(any(results))
 
 
 def _run(kind: str, folder: Path | None, out: Path) -> int:
-    place = [] if folder is None else [str(folder)]
+    folder_argument = [] if folder is None else [str(folder)]
     name = kind if folder is None else f"{kind}-{folder.name}"
-    target = out / f"{name}.json"
+    json_path = out / f"{name}.json"
     echo(f"== visup eval {name.replace('-', ' ', 1)}")
-    begin = time.perf_counter()
+    start = time.perf_counter()
     # A process each, so that timings do not affect each other.
-    command = [sys.executable, "-m", "visup.cli", "eval", kind, *place, "--json", str(target)]
+    command = [
+        sys.executable,
+        "-m",
+        "visup.cli",
+        "eval",
+        kind,
+        *folder_argument,
+        "--json",
+        str(json_path),
+    ]
     code = subprocess.run(command, check=False).returncode
-    echo(f"   {time.perf_counter() - begin:.0f} s, exit code {code}")
+    echo(f"   {time.perf_counter() - start:.0f} s, exit code {code}")
     return code
 
 

@@ -22,12 +22,12 @@ class Calibration:
 
     _bins: Counts = field(default_factory=lambda: [[0.0, 0.0, 0.0] for _ in range(BINS)])
 
-    def add(self, confidence: float, right: bool) -> None:
+    def add(self, confidence: float, correct: bool) -> None:
         """Count one statement; `confidence` is 0 to 1."""
         row = self._bins[min(BINS - 1, max(0, int(confidence * BINS)))]
         row[0] += 1
         row[1] += confidence
-        row[2] += right
+        row[2] += correct
 
     def join(self, counts: Sequence[Sequence[float]]) -> None:
         """Add the counts of another calibration."""
@@ -41,13 +41,17 @@ class Calibration:
 
     def error(self) -> float | None:
         """Expected calibration error, 0 to 1, or None without counts."""
-        total = sum(n for n, _, _ in self._bins)
-        return sum(abs(said - right) for _, said, right in self._bins) / total if total else None
+        total = sum(count for count, _, _ in self._bins)
+        return (
+            sum(abs(expected - correct) for _, expected, correct in self._bins) / total
+            if total
+            else None
+        )
 
     def table(self) -> list[dict[str, float]]:
         """One row for each non-empty bin: count, mean confidence, accuracy."""
         return [
-            {"count": n, "confidence": said / n, "right": right / n}
-            for n, said, right in self._bins
-            if n
+            {"count": count, "confidence": expected / count, "right": correct / count}
+            for count, expected, correct in self._bins
+            if count
         ]

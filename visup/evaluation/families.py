@@ -23,8 +23,8 @@ def family_of(name: str) -> str:
     ['cars', 'drift', '09']
     """
     last = name.rsplit("/", 1)[-1].lower()
-    found = _FIRST_WORD.match(last)
-    return found[0] if found else last
+    match = _FIRST_WORD.match(last)
+    return match[0] if match else last
 
 
 def mean_and_spread(scores: Scores) -> tuple[float, float]:
@@ -39,11 +39,11 @@ def mean_and_spread(scores: Scores) -> tuple[float, float]:
         Mean and standard error; the latter is infinite for a single family.
     """
     mean = sum(scores.values()) / len(scores)
-    off: dict[str, float] = defaultdict(float)
+    family_deviations: dict[str, float] = defaultdict(float)
     for name, value in scores.items():
-        off[family_of(name)] += value - mean
-    families = len(off)
+        family_deviations[family_of(name)] += value - mean
+    families = len(family_deviations)
     if families < 2:
         return mean, math.inf
-    total = sum(d * d for d in off.values())
+    total = sum(deviation * deviation for deviation in family_deviations.values())
     return mean, math.sqrt(total * families / (families - 1)) / len(scores)

@@ -26,15 +26,15 @@ def evaluate_feedback(folder: Path, progress: Progress = silent) -> dict[str, An
         `total` over all, with `runs` and `unreadable`.
     """
     entries = RunLibrary([folder]).scan()
-    sound = [e.folder for e in entries if not e.problem]
-    kinds = precisions(_judged(sound, progress))
+    readable = [e.folder for e in entries if not e.problem]
+    kinds = precisions(_alerts_with_feedback(readable, progress))
     alerts, right, false = (sum(getattr(k, n) for k in kinds) for n in ("alerts", "right", "false"))
-    whole = _figures(KindPrecision("", alerts, right, false))
-    counts = {"runs": len(sound), "unreadable": len(entries) - len(sound)}
-    return {"items": {k.kind: _figures(k) for k in kinds}, "total": {**whole, **counts}}
+    overall = _figures(KindPrecision("", alerts, right, false))
+    counts = {"runs": len(readable), "unreadable": len(entries) - len(readable)}
+    return {"items": {k.kind: _figures(k) for k in kinds}, "total": {**overall, **counts}}
 
 
-def _judged(
+def _alerts_with_feedback(
     folders: list[Path], progress: Progress
 ) -> Iterator[tuple[tuple[Alert, ...], Mapping[int, AlertFeedback]]]:
     for folder in folders:
@@ -46,5 +46,5 @@ def _judged(
 
 
 def _figures(kind: KindPrecision) -> dict[str, Any]:
-    told = {"alerts": kind.alerts, "right": kind.right, "false": kind.false}
-    return {**told, "precision": kind.precision}
+    counts = {"alerts": kind.alerts, "right": kind.right, "false": kind.false}
+    return {**counts, "precision": kind.precision}

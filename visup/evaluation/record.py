@@ -30,8 +30,8 @@ def write_record(path: Path, figures: Mapping[str, Any], settings: Mapping[str, 
     }
     try:
         path.write_text(json.dumps(to_jsonable(record), indent=1) + "\n", encoding="utf-8")
-    except OSError as fault:
-        raise OutputError(f"cannot write: {fault.strerror}", where=str(path)) from fault
+    except OSError as error:
+        raise OutputError(f"cannot write: {error.strerror}", where=str(path)) from error
 
 
 def machine() -> dict[str, Any]:

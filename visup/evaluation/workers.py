@@ -10,7 +10,7 @@ from multiprocessing import get_context, parent_process
 from typing import Any, TypeVar
 
 Item = TypeVar("Item")
-Found = TypeVar("Found")
+Result = TypeVar("Result")
 
 
 def worker_pool(
@@ -23,13 +23,13 @@ def worker_pool(
         prepare: Called first in each, or None; a module-level function, which is pickled.
         *arguments: Its arguments.
     """
-    begin = (prepare, arguments)
-    return ProcessPoolExecutor(workers, get_context("spawn"), _begin, begin)
+    initargs = (prepare, arguments)
+    return ProcessPoolExecutor(workers, get_context("spawn"), _initialise, initargs)
 
 
 def each_in_processes(
-    work: Callable[[Item], Found], items: Sequence[Item], workers: int
-) -> Iterator[tuple[Item, Found]]:
+    work: Callable[[Item], Result], items: Sequence[Item], workers: int
+) -> Iterator[tuple[Item, Result]]:
     """Each item with its result, in order of completion; in this process with a single worker.
 
     Args:
@@ -42,12 +42,12 @@ def each_in_processes(
         yield from ((item, work(item)) for item in items)
         return
     with worker_pool(workers) as pool:
-        todo = {pool.submit(work, item): item for item in items}
-        for done in as_completed(todo):
-            yield todo[done], done.result()
+        pending = {pool.submit(work, item): item for item in items}
+        for future in as_completed(pending):
+            yield pending[future], future.result()
 
 
-def _begin(prepare: Callable[..., None] | None, arguments: Sequence[Any]) -> None:
+def _initialise(prepare: Callable[..., None] | None, arguments: Sequence[Any]) -> None:
     import cv2
 
     cv2.setNumThreads(1)  # the processes share the cores already

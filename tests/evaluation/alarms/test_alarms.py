@@ -1,4 +1,4 @@
-"""Alarms on sound footage are counted by kind, and those that the truth expects are none."""
+"""False alarms are counted by kind; alarms that the ground truth expects do not count."""
 
 from __future__ import annotations
 
@@ -15,13 +15,16 @@ from tests.percepts.motion.clips import clip, texture
 from visup.agent.model.errors import SettingsError
 from visup.evaluation.alarms.runner import AlarmCounts, alarm_rates, evaluate_alarms
 
-KINDS = st.dictionaries(st.sampled_from("abc"), st.integers(1, 9))
+ALARM_COUNTS = st.dictionaries(st.sampled_from("abc"), st.integers(1, 9))
 
 
-@given(st.lists(st.tuples(KINDS, st.floats(1.0, 1e4)), min_size=1, max_size=6))
+@given(st.lists(st.tuples(ALARM_COUNTS, st.floats(1.0, 1e4)), min_size=1, max_size=6))
 def test_rates_add_up_over_clips_and_kinds(clips: list[tuple[dict[str, int], float]]) -> None:
-    found = {str(n): AlarmCounts(Counter(k), Counter(), s) for n, (k, s) in enumerate(clips)}
-    figures = alarm_rates(found)
+    counts = {
+        str(n): AlarmCounts(Counter(alarms), Counter(), seconds)
+        for n, (alarms, seconds) in enumerate(clips)
+    }
+    figures = alarm_rates(counts)
     total, items = figures["total"], figures["items"]
     assert total["alarms"] == sum(i["alarms"] for i in items.values())
     assert total["per_hour"] == pytest.approx(sum(i["per_hour"] for i in items.values()))
@@ -29,11 +32,11 @@ def test_rates_add_up_over_clips_and_kinds(clips: list[tuple[dict[str, int], flo
     assert all(1 <= i["clips"] <= i["alarms"] for i in items.values())
 
 
-def test_a_sound_clip_raises_nothing(tmp_path: Path) -> None:
-    place = tmp_path / "still" / "frames"
-    place.mkdir(parents=True)
-    for shot in clip(texture(1, (120, 160), 0, 255), lambda n: (8, 8), [], 12):
-        cv2.imwrite(str(place / f"{shot.frame.index:05d}.png"), shot.frame.image)
+def test_a_still_scene_raises_no_alarm(tmp_path: Path) -> None:
+    folder = tmp_path / "still" / "frames"
+    folder.mkdir(parents=True)
+    for labelled in clip(texture(1, (120, 160), 0, 255), lambda n: (8, 8), [], 12):
+        cv2.imwrite(str(folder / f"{labelled.frame.index:05d}.png"), labelled.frame.image)
     figures = evaluate_alarms(tmp_path, limit=10)
     assert figures["items"] == {}
     assert figures["total"]["alarms"] == 0

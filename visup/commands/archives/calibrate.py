@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from visup.archive.lake import Lake
-    from visup.evaluation.archive.calibrating import Reliability, RunTruth
+    from visup.evaluation.archive.reliability import Reliability, RunTruth
 
 NOT_FITTED = "No settings were fitted; use --fit FILE."
 
@@ -41,8 +41,8 @@ def calibrate(
     """Check calibration: how often statements of a given confidence were right."""
     from visup.archive.querying.database import open_database
     from visup.archive.storing.places import open_lake
-    from visup.evaluation.archive.calibrating import read_truth, reliabilities, truth_by_run
     from visup.evaluation.archive.calibration_page import calibration_page
+    from visup.evaluation.archive.reliability import read_truth, reliabilities, truth_by_run
     from visup.report.page.shell import write_page
     from visup.terminal.console import echo_json
 
@@ -64,14 +64,17 @@ def _fit(lake: Lake, truths: Mapping[str, RunTruth], path: Path) -> str:
     """Fit the weight of identity votes and write it; returns a sentence about the result."""
     from visup.agent.model.errors import OutputError
     from visup.agent.storage.atomic import write_atomically
-    from visup.evaluation.archive.vote_fitting import FEWEST, fitted_evidence, labelled_votes
+    from visup.evaluation.archive.vote_fitting import MIN_LABELLED, fitted_evidence, labelled_votes
     from visup.rules.identity import VoteSettings
     from visup.runs.inputs.settings_file import fitted_settings
 
     labelled = list(labelled_votes(lake, truths))
     evidence = fitted_evidence(labelled)
     if evidence is None:
-        return f"{len(labelled)} objects are labelled; fitting the weight of votes takes at least {FEWEST}."
+        return (
+            f"{len(labelled)} objects are labelled;"
+            f" fitting the weight of votes takes at least {MIN_LABELLED}."
+        )
     comment = (
         f"Weight of a vote for an identity, fitted to {len(labelled)} labelled objects;"
         f" the default is {VoteSettings().evidence:g}."

@@ -30,14 +30,14 @@ class AlarmCounts:
     """The alerts of one clip.
 
     Attributes:
-        grave: Counts of alerts of severity warning or above, by kind.
-        noted: Counts of those below.
+        severe: Counts of alerts of severity warning or above, by kind.
+        minor: Counts of those below.
         seconds: Length of the clip.
         lines: Lines of its narrative on a terminal.
     """
 
-    grave: Counter[str] = field(default_factory=Counter)
-    noted: Counter[str] = field(default_factory=Counter)
+    severe: Counter[str] = field(default_factory=Counter)
+    minor: Counter[str] = field(default_factory=Counter)
     seconds: float = 0.0
     lines: int = 0
     _narrative: Narrative = field(default_factory=Narrative, repr=False)
@@ -48,7 +48,7 @@ class AlarmCounts:
         self.lines += len(self._narrative.lines(step, None))
         for event in step.events:
             if event.kind == "alert":
-                kinds = self.grave if event.severity >= Severity.WARNING else self.noted
+                kinds = self.severe if event.severity >= Severity.WARNING else self.minor
                 kinds[str(event.data["alert_kind"])] += 1
 
 
@@ -73,30 +73,32 @@ def evaluate_alarms(
     Raises:
         SettingsError: There is no video or recorded run below the folder.
     """
-    found: dict[str, AlarmCounts] = {}
+    counts: dict[str, AlarmCounts] = {}
     runs = sorted(p.parent for p in folder.rglob(JOURNAL))
-    for place in runs or find_sources(folder):
-        name = str(place.relative_to(folder)) if place != folder else folder.name
+    for source in runs or find_sources(folder):
+        name = str(source.relative_to(folder)) if source != folder else folder.name
         progress(name)
-        found[name] = _recorded(place) if runs else _watched(place, limit)
-        for kind in _expected(place):
-            found[name].grave.pop(kind, None)
-    return alarm_rates(found)
+        counts[name] = _replay_run(source) if runs else _watch_clip(source, limit)
+        for kind in _expected_kinds(source):
+            counts[name].severe.pop(kind, None)
+    return alarm_rates(counts)
 
 
-def alarm_rates(found: Mapping[str, AlarmCounts]) -> dict[str, Any]:
+def alarm_rates(counts_by_clip: Mapping[str, AlarmCounts]) -> dict[str, Any]:
     """The figures of clips by name."""
-    hours = sum(c.seconds for c in found.values()) / 3600
-    kinds = sorted({k for c in found.values() for k in c.grave})
+    hours = sum(c.seconds for c in counts_by_clip.values()) / 3600
+    kinds = sorted({kind for c in counts_by_clip.values() for kind in c.severe})
     items = {
-        kind: _rate([c.grave[kind] for c in found.values() if c.grave[kind]], hours)
+        kind: _rate([c.severe[kind] for c in counts_by_clip.values() if c.severe[kind]], hours)
         for kind in kinds
     }
-    total = _rate([sum(c.grave.values()) for c in found.values() if c.grave.total()], hours)
-    total |= {"hours": hours, "noted": sum(c.noted.total() for c in found.values())}
-    lines = sum(c.lines for c in found.values())
+    total = _rate(
+        [sum(c.severe.values()) for c in counts_by_clip.values() if c.severe.total()], hours
+    )
+    total |= {"hours": hours, "noted": sum(c.minor.total() for c in counts_by_clip.values())}
+    lines = sum(c.lines for c in counts_by_clip.values())
     total["lines_per_min"] = lines / (60 * hours) if hours else 0.0
-    raised = {name: dict(c.grave) for name, c in found.items() if c.grave.total()}
+    raised = {name: dict(c.severe) for name, c in counts_by_clip.items() if c.severe.total()}
     return {"total": total, "items": items, "raised": raised}
 
 
@@ -105,7 +107,7 @@ def _rate(alarms: Sequence[int], hours: float) -> dict[str, Any]:
     return {"alarms": sum(alarms), "clips": len(alarms), "per_hour": per_hour}
 
 
-def _watched(source: Path, limit: int | None) -> AlarmCounts:
+def _watch_clip(source: Path, limit: int | None) -> AlarmCounts:
     counts = AlarmCounts()
     settings = WatchSettings(source=str(source))
     agent = build_agent(settings, observers=(counts,))
@@ -114,16 +116,16 @@ def _watched(source: Path, limit: int | None) -> AlarmCounts:
     return counts
 
 
-def _recorded(run: Path) -> AlarmCounts:
+def _replay_run(run: Path) -> AlarmCounts:
     counts = AlarmCounts()
     recording = Recording.open(run)
     replay(recording, replace(settings_for(recording), tasks=(), actors={}), on_step=counts)
     return counts
 
 
-def _expected(place: Path) -> set[str]:
+def _expected_kinds(source: Path) -> set[str]:
     """The expected kinds of alerts in the truth of a clip."""
-    truth = place.parent / "truth.json"
+    truth = source.parent / "truth.json"
     if not truth.is_file():
         return set()
-    return {str(a["kind"]) for a in read_json(truth).get("alerts") or ()}
+    return {str(alert["kind"]) for alert in read_json(truth).get("alerts") or ()}

@@ -9,44 +9,53 @@ from typing import Any
 
 from visup.archive.reporting.figures import BAND, LINE
 from visup.archive.reporting.page import archive_page, html_table
-from visup.evaluation.archive.calibrating import Reliability
+from visup.evaluation.archive.reliability import Reliability
 from visup.report.page.figures import Figure, rounded
 from visup.report.page.sections import figures
 
-NUMBERS_HEAD = ("statements about", "count", "right", "calibration error", "Brier score")
-SMALLEST_PX, LARGEST_PX = 6.0, 24.0
+TABLE_HEADER = ("statements about", "count", "right", "calibration error", "Brier score")
+MIN_MARKER_PX, MAX_MARKER_PX = 6.0, 24.0
 
 
-def calibration_page(found: Sequence[Reliability], lake: Path, fitted: str) -> str:
+def calibration_page(reliabilities: Sequence[Reliability], lake: Path, fitted: str) -> str:
     """The whole page; deterministic.
 
     Args:
-        found: Reliability of each kind of statement.
+        reliabilities: Reliability of each kind of statement.
         lake: The lake, for the title.
         fitted: A sentence about fitted settings.
+
+    Returns:
+        HTML.
 
     Raises:
         ExtraMissingError: Plotly is not installed.
     """
-    drawn = [reliability_figure(one) for one in found]
+    diagrams = [reliability_figure(r) for r in reliabilities]
     rows = [
-        (one.kind, f"{one.count:,}", f"{one.right:.0%}", f"{one.error:.3f}", f"{one.brier:.3f}")
-        for one in found
+        (
+            r.kind,
+            f"{r.count:,}",
+            f"{r.right:.0%}",
+            f"{r.error:.3f}",
+            f"{r.brier:.3f}",
+        )
+        for r in reliabilities
     ]
     text = {
         "title": escape(lake.absolute().name),
-        "diagrams": figures(drawn, "No statement can be compared with the ground truth."),
+        "diagrams": figures(diagrams, "No statement can be compared with the ground truth."),
         "numbers": html_table(
-            NUMBERS_HEAD, rows, "No statement can be compared with the ground truth."
+            TABLE_HEADER, rows, "No statement can be compared with the ground truth."
         ),
         "fitted": escape(fitted),
     }
-    return archive_page("calibration.html", text, drawn, "calibration")
+    return archive_page("calibration.html", text, diagrams, "calibration")
 
 
-def reliability_figure(one: Reliability) -> Figure:
+def reliability_figure(reliability: Reliability) -> Figure:
     """A reliability diagram: the share of right statements at each level of confidence."""
-    most = max(b["count"] for b in one.bins)
+    max_count = max(b["count"] for b in reliability.bins)
     line = {
         "type": "scatter",
         "mode": "lines",
@@ -59,25 +68,25 @@ def reliability_figure(one: Reliability) -> Figure:
     points = {
         "type": "scatter",
         "mode": "lines+markers",
-        "name": one.kind,
-        "x": [rounded(b["confidence"]) for b in one.bins],
-        "y": [rounded(b["right"]) for b in one.bins],
-        "customdata": [b["count"] for b in one.bins],
-        "marker": {"size": [_size(b["count"] / most) for b in one.bins]},
+        "name": reliability.kind,
+        "x": [rounded(b["confidence"]) for b in reliability.bins],
+        "y": [rounded(b["right"]) for b in reliability.bins],
+        "customdata": [b["count"] for b in reliability.bins],
+        "marker": {"size": [_marker_size(b["count"] / max_count) for b in reliability.bins]},
         "line": {"color": LINE},
         "hovertemplate": "confidence %{x:.2f}, right %{y:.2f}, count %{customdata:.0f}<extra></extra>",
     }
     caption = (
-        f"Statements: {one.count:,}, of which {one.right:.0%} right; calibration error {one.error:.3f},"
-        f" Brier score {one.brier:.3f}."
+        f"Statements: {reliability.count:,}, of which {reliability.right:.0%} right;"
+        f" calibration error {reliability.error:.3f}, Brier score {reliability.brier:.3f}."
     )
-    title = f"Confidence of {one.kind}"
-    return Figure(f"reliability-{one.kind}", title, caption, [line, points], _layout())
+    title = f"Confidence of {reliability.kind}"
+    return Figure(f"reliability-{reliability.kind}", title, caption, [line, points], _layout())
 
 
-def _size(share: float) -> float:
+def _marker_size(share: float) -> float:
     """Diameter of a point, pixels, with an area proportional to its share."""
-    return rounded(SMALLEST_PX + (LARGEST_PX - SMALLEST_PX) * share**0.5)
+    return rounded(MIN_MARKER_PX + (MAX_MARKER_PX - MIN_MARKER_PX) * share**0.5)
 
 
 def _layout() -> dict[str, Any]:

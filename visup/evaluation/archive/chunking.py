@@ -31,18 +31,18 @@ from visup.runs.wiring import open_video
 
 CHUNKS = 3
 EventCounts = tuple[int, int, int]
-"""Equal, excess and missed events."""
-Beliefs = Mapping[int, Sequence[Region]]
+"""True positives, false positives and false negatives: events in both runs, excess and missed ones."""
+RegionsByFrame = Mapping[int, Sequence[Region]]
 """Frame -> visible objects, as regions with the ids of the objects."""
 
 
 def compare_chunks(
-    place: Path, missions: Sequence[Path], database: Path, progress: Progress
+    folder: Path, missions: Sequence[Path], database: Path, progress: Progress
 ) -> dict[str, Any]:
     """Process missions uncut and in three chunks.
 
     Args:
-        place: A folder for the lakes.
+        folder: A folder for the lakes.
         missions: Folders with `mission.json` and `video.mp4`.
         database: The model database.
         progress: Shows what is being done.
@@ -52,34 +52,34 @@ def compare_chunks(
         `scored_f1` of the scored kinds, `shifted_f1` of the uncut runs without their first frame; `verdicts`
         that differ; `longer`, the relative overhead in frames; `worst` mission by F1.
     """
-    found = [_compared(place, mission, database, progress) for mission in missions]
-    right, excess, missed = _sums(one.counts for one in found)
+    comparisons = [_compare_mission(folder, mission, database, progress) for mission in missions]
+    matched, excess, missed = _sums(c.counts for c in comparisons)
     return {
         "missions": len(missions),
-        "events": right + missed,
+        "events": matched + missed,
         "excess": excess,
         "missed": missed,
-        "event_f1": precision_recall_f1(right, excess, missed)[2],
-        "scored_f1": precision_recall_f1(*_sums(one.scored for one in found))[2],
-        "shifted_f1": precision_recall_f1(*_sums(one.shifted for one in found))[2],
-        "verdicts": sum(one.verdicts[0] != one.verdicts[1] for one in found),
-        "longer": sum(one.looked for one in found) / sum(one.frames for one in found) - 1.0,
-        "worst": min(found, key=lambda one: precision_recall_f1(*one.counts)[2]).mission,
+        "event_f1": precision_recall_f1(matched, excess, missed)[2],
+        "scored_f1": precision_recall_f1(*_sums(c.scored for c in comparisons))[2],
+        "shifted_f1": precision_recall_f1(*_sums(c.shifted for c in comparisons))[2],
+        "verdicts": sum(c.verdicts[0] != c.verdicts[1] for c in comparisons),
+        "longer": sum(c.processed for c in comparisons) / sum(c.frames for c in comparisons) - 1.0,
+        "worst": min(comparisons, key=lambda c: precision_recall_f1(*c.counts)[2]).mission,
     }
 
 
 @dataclass(frozen=True, slots=True)
-class _Compared:
-    """A mission uncut and in chunks.
+class _ChunkComparison:
+    """The comparison of a mission uncut and in chunks.
 
     Attributes:
         mission: Its name.
-        counts: Equal, excess and missed events.
+        counts: Counts of all events.
         scored: The same for scored kinds only.
         shifted: The same for the uncut run without its first frame.
         verdicts: Both verdicts.
         frames: Frames of the video.
-        looked: Total frames of all chunks.
+        processed: Total frames of all chunks.
     """
 
     mission: str
@@ -88,40 +88,49 @@ class _Compared:
     shifted: EventCounts
     verdicts: tuple[str | None, str | None]
     frames: int
-    looked: int
+    processed: int
 
 
-def _compared(place: Path, mission: Path, database: Path, progress: Progress) -> _Compared:
+def _compare_mission(
+    folder: Path, mission: Path, database: Path, progress: Progress
+) -> _ChunkComparison:
     settings = mission_settings(mission, database)
     with open_video(settings) as source:
         frames, seconds = source.frame_count or 0, (source.frame_count or 0) / source.fps
-    ways: Mapping[str, tuple[Cutting | None, Watch]] = {
+    variants: Mapping[str, tuple[Cutting | None, Watch]] = {
         "whole": (None, watch_into),
         "cut": (Cutting(seconds / CHUNKS), watch_into),
         "shifted": (None, partial(watch_into, span=(1, None))),
     }
     lakes = {}
-    for name, (cutting, watch) in ways.items():
+    for name, (cutting, watch) in variants.items():
         progress(f"{mission.name}, {name}")
-        lake = lakes[name] = Lake.create(place / f"{mission.name}-{name}")
+        lake = lakes[name] = Lake.create(folder / f"{mission.name}-{name}")
         plan = make_plan(lake, [Clip(mission / "video.mp4", taken=0.0)], settings, cutting)
-        fill(lake, plan, Pool(), _silent, watch)
-    counts, scored = _counted(lakes["whole"], lakes["cut"])
-    shifted, _ = _counted(lakes["whole"], lakes["shifted"])
+        fill(lake, plan, Pool(), _ignore_outcome, watch)
+    counts, scored = _compare_runs(lakes["whole"], lakes["cut"])
+    shifted, _ = _compare_runs(lakes["whole"], lakes["shifted"])
     progress(f"{mission.name}: {counts[0]} events alike, {counts[1]} in excess, {counts[2]} missed")
-    facts, (row,) = _facts(lakes["cut"]), lakes["whole"].rows("runs")
-    looked = sum(last - first + 1 for first, last in facts["chunks"])
-    verdicts = row["verdict"], facts["verdict"]
-    return _Compared(mission.name, counts, scored, shifted, verdicts, frames, looked)
+    facts, (uncut_facts,) = _facts(lakes["cut"]), lakes["whole"].rows("runs")
+    processed = sum(last - first + 1 for first, last in facts["chunks"])
+    verdicts = uncut_facts["verdict"], facts["verdict"]
+    return _ChunkComparison(mission.name, counts, scored, shifted, verdicts, frames, processed)
 
 
-def _counted(whole: Lake, other: Lake) -> tuple[EventCounts, EventCounts]:
+def _compare_runs(whole: Lake, other: Lake) -> tuple[EventCounts, EventCounts]:
     """Compare the events of two runs of a video: all, and those of scored kinds."""
-    (one, seen), (again, seen_again) = _told(whole), _told(other)
-    same = same_objects(seen, seen_again)
+    (expected, whole_regions), (observed, other_regions) = (
+        _replay_with_regions(whole),
+        _replay_with_regions(other),
+    )
+    object_map = matched_objects(whole_regions, other_regions)
     return (
-        matching_events(one.events, again.events, same),
-        matching_events(_scored(one.events), _scored(again.events), same),
+        matching_events(expected.events, observed.events, object_map),
+        matching_events(
+            _scored_events(expected.events),
+            _scored_events(observed.events),
+            object_map,
+        ),
     )
 
 
@@ -131,41 +140,45 @@ def _facts(lake: Lake) -> Mapping[str, Any]:
 
 
 def matching_events(
-    whole: Iterable[Line], cut: Iterable[Line], same: Mapping[int, int]
+    whole: Iterable[Line], cut: Iterable[Line], object_map: Mapping[int, int]
 ) -> EventCounts:
-    """Numbers of equal, excess and missed events of a run in chunks.
+    """Match the events of a run in chunks to those of the uncut run.
 
-    Events are equal if kind, objects and named details agree within a second; each counts once.
+    Two events match if kind, objects and named details agree and they are within a second of each other;
+    each is matched once, to the nearest in time.
 
     Args:
         whole: Events of the uncut run.
         cut: Events of the other run.
-        same: Object of the other run -> object of the uncut run.
+        object_map: Object of the other run -> object of the uncut run.
+
+    Returns:
+        Numbers of matched, excess and missed events.
     """
-    real, said = list(whole), list(cut)
-    left = set(range(len(real)))
-    for event in said:
-        near = [
-            (abs(real[n]["time"] - event["time"]), n)
-            for n in left
-            if _about(real[n], {}) == _about(event, same)
+    expected, observed = list(whole), list(cut)
+    unmatched = set(range(len(expected)))
+    for event in observed:
+        candidates = [
+            (abs(expected[n]["time"] - event["time"]), n)
+            for n in unmatched
+            if _event_key(expected[n], {}) == _event_key(event, object_map)
         ]
-        if near and min(near)[0] <= EVENT_TOLERANCE_S:
-            left.discard(min(near)[1])
-    right = len(real) - len(left)
-    return right, len(said) - right, len(left)
+        if candidates and min(candidates)[0] <= EVENT_TOLERANCE_S:
+            unmatched.discard(min(candidates)[1])
+    matched = len(expected) - len(unmatched)
+    return matched, len(observed) - matched, len(unmatched)
 
 
-def _scored(events: Iterable[Line]) -> list[Line]:
-    return [e for e in events if e["kind"] in SCORED_EVENTS]
+def _scored_events(events: Iterable[Line]) -> list[Line]:
+    return [event for event in events if event["kind"] in SCORED_EVENTS]
 
 
 def _sums(counts: Iterable[EventCounts]) -> EventCounts:
-    right, excess, missed = map(sum, zip(*counts, strict=True))
-    return right, excess, missed
+    matched, excess, missed = map(sum, zip(*counts, strict=True))
+    return matched, excess, missed
 
 
-def same_objects(whole: Beliefs, cut: Beliefs) -> dict[int, int]:
+def matched_objects(whole: RegionsByFrame, cut: RegionsByFrame) -> dict[int, int]:
     """Object of the run in chunks -> object of the uncut one, by overlap."""
     matcher = RegionMatcher()
     for frame in whole.keys() & cut.keys():
@@ -173,26 +186,30 @@ def same_objects(whole: Beliefs, cut: Beliefs) -> dict[int, int]:
     return matcher.same()
 
 
-def _about(event: Line, same: Mapping[int, int]) -> tuple[Any, ...]:
-    named = {k: v for k, v in event["data"].items() if isinstance(v, str)}
-    objects = tuple(same.get(o, -o) for o in event["objects"]) if same else tuple(event["objects"])
+def _event_key(event: Line, object_map: Mapping[int, int]) -> tuple[Any, ...]:
+    named = {key: value for key, value in event["data"].items() if isinstance(value, str)}
+    objects = (
+        tuple(object_map.get(o, -o) for o in event["objects"])
+        if object_map
+        else tuple(event["objects"])
+    )
     return event["kind"], objects, tuple(sorted(named.items()))
 
 
-def _told(lake: Lake) -> tuple[Transcript, Beliefs]:
-    """The transcript of the run of a lake, and the regions of its objects."""
-    seen: dict[int, list[Region]] = {}
+def _replay_with_regions(lake: Lake) -> tuple[Transcript, RegionsByFrame]:
+    """The transcript of the only run of a lake, and the regions of its objects by frame."""
+    regions: dict[int, list[Region]] = {}
 
-    def look(step: Step) -> None:
-        seen[step.frame_index] = [
-            replace(b.region, id=b.id)
-            for b in step.mind.objects.values()
-            if b.last_seen == step.time
+    def record_regions(step: Step) -> None:
+        regions[step.frame_index] = [
+            replace(belief.region, id=belief.id)
+            for belief in step.mind.objects.values()
+            if belief.last_seen == step.time
         ]
 
     (run,) = lake.runs()
-    return replay(*lake.recorded(run), on_step=look), seen
+    return replay(*lake.recorded(run), on_step=record_regions), regions
 
 
-def _silent(outcome: ClipOutcome) -> None:
+def _ignore_outcome(outcome: ClipOutcome) -> None:
     """Ignore an outcome."""

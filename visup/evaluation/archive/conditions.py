@@ -9,17 +9,18 @@ RELATIONS = (
     *("converging", "diverging", "keeping_distance", "touching", "coupled"),
     *("north_of", "moving_towards", "close_to", "partially_overlapping"),
 )
-DEEPEST = 3
+MAX_DEPTH = 3
+"""Maximum nesting of operators."""
 
 
 def random_conditions(count: int, seed: int) -> list[str]:
     """Conditions about `a` and `b`, all different."""
-    rng, found = Random(seed), dict[str, None]()
-    while len(found) < count:
-        text = _condition(rng, rng.randint(0, DEEPEST))
+    rng, conditions = Random(seed), dict[str, None]()
+    while len(conditions) < count:
+        text = _condition(rng, rng.randint(0, MAX_DEPTH))
         if "a" in text and "b" in text:
-            found[text] = None
-    return list(found)
+            conditions[text] = None
+    return list(conditions)
 
 
 def _condition(rng: Random, depth: int) -> str:
@@ -30,33 +31,33 @@ def _condition(rng: Random, depth: int) -> str:
             + ["gap(a, b) < 60 px", "(moving(a) and touching(a, b))"]
         )
 
-    def part() -> str:
+    def operand() -> str:
         return f"({_condition(rng, depth - 1)})"
 
-    span = f"{rng.choice((0.2, 0.7, 1.5))} s"
+    duration = f"{rng.choice((0.2, 0.7, 1.5))} s"
     operators: list[Callable[[], str]] = [
-        lambda: f"{part()} and {part()}",
-        lambda: f"{part()} or {part()}",
-        lambda: f"not {part()}",
-        lambda: f"{part()} implies {part()}",
-        lambda: f"{part()} within {span}",
-        lambda: f"{part()} for {span}",
-        lambda: f"{part()} within 0.3 s to 1.1 s ago",
-        lambda: f"{part()} for 0.3 s to 1.1 s ago",
-        lambda: f"once {part()}",
-        lambda: f"always {part()}",
-        lambda: f"previous {part()}",
-        lambda: f"{part()} since {part()}",
-        lambda: f"{part()} since[{span}] {part()}",
-        lambda: f"{part()} until[{span}] {part()}",
-        lambda: f"{part()} release[{span}] {part()}",
-        lambda: f"eventually[{span}] {part()}",
-        lambda: f"henceforth[{span}] {part()}",
-        lambda: f"{part()} in 60 % of {span}",
-        lambda: f"{part()} in 2 of 4 samples",
-        lambda: f"last({part()}, {span})",
-        lambda: f"(exists c: (touching(b, c) and converging(a, c))) or {part()}",
-        lambda: f"(exists c: converging(a, c)) and {part()}",
-        lambda: f"{part()} and (forall c: not touching(a, c))",
+        lambda: f"{operand()} and {operand()}",
+        lambda: f"{operand()} or {operand()}",
+        lambda: f"not {operand()}",
+        lambda: f"{operand()} implies {operand()}",
+        lambda: f"{operand()} within {duration}",
+        lambda: f"{operand()} for {duration}",
+        lambda: f"{operand()} within 0.3 s to 1.1 s ago",
+        lambda: f"{operand()} for 0.3 s to 1.1 s ago",
+        lambda: f"once {operand()}",
+        lambda: f"always {operand()}",
+        lambda: f"previous {operand()}",
+        lambda: f"{operand()} since {operand()}",
+        lambda: f"{operand()} since[{duration}] {operand()}",
+        lambda: f"{operand()} until[{duration}] {operand()}",
+        lambda: f"{operand()} release[{duration}] {operand()}",
+        lambda: f"eventually[{duration}] {operand()}",
+        lambda: f"henceforth[{duration}] {operand()}",
+        lambda: f"{operand()} in 60 % of {duration}",
+        lambda: f"{operand()} in 2 of 4 samples",
+        lambda: f"last({operand()}, {duration})",
+        lambda: f"(exists c: (touching(b, c) and converging(a, c))) or {operand()}",
+        lambda: f"(exists c: converging(a, c)) and {operand()}",
+        lambda: f"{operand()} and (forall c: not touching(a, c))",
     ]
     return rng.choice(operators)()

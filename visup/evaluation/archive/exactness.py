@@ -19,18 +19,18 @@ from visup.evaluation.figures import Progress
 from visup.rules.safety.queries import verdicts
 from visup.runs.replay import replay
 
-AT_ONCE = 25
+CONDITIONS_PER_REPLAY = 25
 """Conditions per replay."""
 
 
 @dataclass(slots=True)
 class FindComparison:
-    """The result of a comparison.
+    """Counts of compared truth values and of differences.
 
     Attributes:
         verdicts: Number of compared truth values (condition, objects, step).
         different: Number of differences, including hits in a skipped run.
-        looked: Pairs of condition and run that had to be evaluated.
+        scanned: Pairs of condition and run that had to be evaluated.
         pairs: All pairs of condition and run.
         quick: Pairs evaluated without replaying the reasoning.
         examples: Conditions with differences.
@@ -38,12 +38,12 @@ class FindComparison:
 
     verdicts: int = 0
     different: int = 0
-    looked: int = 0
+    scanned: int = 0
     pairs: int = 0
     quick: int = 0
     examples: set[str] | None = None
 
-    def note(self, text: str, same: bool) -> None:
+    def add(self, text: str, same: bool) -> None:
         """Count one comparison."""
         self.verdicts += 1
         if not same:
@@ -67,53 +67,57 @@ def compare_find(
         `formulas`, `verdicts`, `different` (0 if correct), `quick` (share evaluated without replaying the
         reasoning), `scanned` (share of runs that had to be evaluated) and `examples` of differences.
     """
-    found = FindComparison()
+    comparison = FindComparison()
     texts = random_conditions(formulas, seed)
-    for first in range(0, formulas, AT_ONCE):
+    for first in range(0, formulas, CONDITIONS_PER_REPLAY):
         progress(f"condition {first} of {formulas}")
-        _compare(lake, texts[first : first + AT_ONCE], scratch / "all.rules", found)
+        _compare(
+            lake, texts[first : first + CONDITIONS_PER_REPLAY], scratch / "all.rules", comparison
+        )
     return {
         "formulas": formulas,
-        "verdicts": found.verdicts,
-        "different": found.different,
-        "quick": found.quick / max(1, found.pairs),
-        "scanned": found.looked / max(1, found.pairs),
-        "examples": sorted(found.examples or ()),
+        "verdicts": comparison.verdicts,
+        "different": comparison.different,
+        "quick": comparison.quick / max(1, comparison.pairs),
+        "scanned": comparison.scanned / max(1, comparison.pairs),
+        "examples": sorted(comparison.examples or ()),
     }
 
 
-def _compare(lake: Lake, texts: Sequence[str], rules: Path, found: FindComparison) -> None:
+def _compare(lake: Lake, texts: Sequence[str], rules: Path, comparison: FindComparison) -> None:
     rules.write_text(
-        "\n".join(f'rule f{n}(a, b): info when {text} say "."' for n, text in enumerate(texts))
+        "\n".join(
+            f'rule f{number}(a, b): info when {text} say "."' for number, text in enumerate(texts)
+        )
     )
     searches = [ConditionSearch(read_pattern(text)) for text in texts]
     with open_database(lake) as database:
         possible = [set(search.possible_runs(database)) for search in searches]
     for run in lake.runs():
         recording, settings = lake.recorded(run)
-        judges = [PatternEvaluator(s.pattern) for s in searches]
+        evaluators = [PatternEvaluator(search.pattern) for search in searches]
 
-        def look(step: Step, judges: list[PatternEvaluator] = judges) -> None:
-            for n, judge in enumerate(judges):
-                _compare_step(step, judge, f"f{n}", texts[n], found)
+        def compare_step(step: Step, evaluators: list[PatternEvaluator] = evaluators) -> None:
+            for number, evaluator in enumerate(evaluators):
+                _compare_step(step, evaluator, f"f{number}", texts[number], comparison)
 
-        replay(recording, replace(settings, rules=(rules,)), on_step=look)
-        for n, judge in enumerate(judges):
-            hits = tuple(h for h in judge.hits() if h.truth == Truth.TRUE)
-            found.note(texts[n], not hits or run in possible[n])
-            if searches[n].quick:
-                found.quick += 1
-                found.note(texts[n], searches[n].hits(recording, settings) == hits)
-            found.looked += run in possible[n]
-            found.pairs += 1
+        replay(recording, replace(settings, rules=(rules,)), on_step=compare_step)
+        for number, evaluator in enumerate(evaluators):
+            hits = tuple(hit for hit in evaluator.hits() if hit.truth == Truth.TRUE)
+            comparison.add(texts[number], not hits or run in possible[number])
+            if searches[number].quick:
+                comparison.quick += 1
+                comparison.add(texts[number], searches[number].hits(recording, settings) == hits)
+            comparison.scanned += run in possible[number]
+            comparison.pairs += 1
 
 
 def _compare_step(
-    step: Step, judge: PatternEvaluator, rule: str, text: str, found: FindComparison
+    step: Step, evaluator: PatternEvaluator, rule: str, text: str, comparison: FindComparison
 ) -> None:
-    judge(step)
-    said = verdicts(step.mind, rule)
-    assert judge.before is not None
-    for reading in judge.before.readings:
-        meant = dict(zip(judge.pattern.rule.variables, reading.objects, strict=True))
-        found.note(text, reading.truth == said[meant["a"], meant["b"]])
+    evaluator(step)
+    rule_verdicts = verdicts(step.mind, rule)
+    assert evaluator.before is not None
+    for reading in evaluator.before.readings:
+        objects = dict(zip(evaluator.pattern.rule.variables, reading.objects, strict=True))
+        comparison.add(text, reading.truth == rule_verdicts[objects["a"], objects["b"]])

@@ -22,41 +22,53 @@ from visup.evaluation.figures import Progress
 
 FRAMES = 16
 SIZE = (160, 120)
-DISC = 31
-STEP = 5
+DISC_PX = 31
+DISC_SPEED = 5
 """Motion of a disc, pixels per frame."""
 WORKERS = 2
-SLOWEST_S = 3600.0
-Gray = NDArray[np.uint8]
-KINDS = ("workers", "starters", "heads")
+MAX_FILL_S = 3600.0
+"""Seconds after which filling a lake is given up."""
+GreyImage = NDArray[np.uint8]
+KILL_TARGETS = ("workers", "starters", "heads")
 """What is killed: workers, their parent processes, or the command with all of them."""
 
 
 def write_clips(folder: Path, count: int, seed: int = 0) -> Path:
-    """Distinct short clips: two textured discs pass each other before a textured background."""
+    """Write short clips, each different: two textured discs pass each other before a textured background.
+
+    Args:
+        folder: Folder for the clips; created if missing.
+        count: Number of clips.
+        seed: Random seed.
+
+    Returns:
+        The folder.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     for number in range(count):
         rng = np.random.default_rng((seed, number))
-        ground = _texture(rng, (0, 120), SIZE[::-1])
-        discs = [_texture(rng, (120, 255), (DISC, DISC)) for _ in range(2)]
-        kind, path = cv2.VideoWriter.fourcc(*"MJPG"), folder / f"clip-{number:04}.avi"
-        writer = cv2.VideoWriter(str(path), kind, 25.0, SIZE)
+        background = _texture(rng, (0, 120), SIZE[::-1])
+        discs = [_texture(rng, (120, 255), (DISC_PX, DISC_PX)) for _ in range(2)]
+        codec, path = cv2.VideoWriter.fourcc(*"MJPG"), folder / f"clip-{number:04}.avi"
+        writer = cv2.VideoWriter(str(path), codec, 25.0, SIZE)
         for index in range(FRAMES):
-            image, x = ground.copy(), 8 + STEP * index
-            image[20 : 20 + DISC, x : x + DISC] = discs[0]
-            image[70 : 70 + DISC, SIZE[0] - x - DISC : SIZE[0] - x] = discs[1]
+            image, x = background.copy(), 8 + DISC_SPEED * index
+            image[20 : 20 + DISC_PX, x : x + DISC_PX] = discs[0]
+            image[70 : 70 + DISC_PX, SIZE[0] - x - DISC_PX : SIZE[0] - x] = discs[1]
             writer.write(np.repeat(image[:, :, None], 3, axis=2))
         writer.release()
     return folder
 
 
-def _texture(rng: np.random.Generator, values: tuple[int, int], shape: tuple[int, int]) -> Gray:
-    rough = rng.integers(*values, shape).astype(np.uint8)
-    return cv2.GaussianBlur(rough, (0, 0), 1.5).astype(np.uint8)
+def _texture(
+    rng: np.random.Generator, values: tuple[int, int], shape: tuple[int, int]
+) -> GreyImage:
+    noise = rng.integers(*values, shape).astype(np.uint8)
+    return cv2.GaussianBlur(noise, (0, 0), 1.5).astype(np.uint8)
 
 
 def compare_killed(
-    place: Path, clips: int, kills: int, heads: int, seed: int, progress: Progress
+    folder: Path, clips: int, kills: int, heads: int, seed: int, progress: Progress
 ) -> dict[str, Any]:
     """Fill a lake undisturbed, and one while processes are killed; compare them row for row.
 
@@ -64,7 +76,7 @@ def compare_killed(
     further lakes are filled and compared, too.
 
     Args:
-        place: A folder for all lakes.
+        folder: A folder for all lakes.
         clips: Number of short clips.
         kills: Number of kills of workers.
         heads: Number of kills of the command with scheduler and workers; also of the parents of workers.
@@ -75,45 +87,45 @@ def compare_killed(
         `clips`; killed `workers`, `starters` and `heads`; `calls` of the command, filled `lakes`, compared
         `rows`, and `different` rows.
     """
-    footage = write_clips(place / "clips", clips, seed)
+    clip_folder = write_clips(folder / "clips", clips, seed)
     progress("undisturbed")
     begin = time.monotonic()
-    _wait(_begun(footage, place / "whole"))
-    took, begin = time.monotonic() - begin, time.monotonic()
+    _wait(_start_filling(clip_folder, folder / "whole"))
+    undisturbed_s, begin = time.monotonic() - begin, time.monotonic()
     killer = RandomKills(
-        dict(zip(KINDS, (kills, heads, heads), strict=True)),
-        2.0 * took / (kills + 2 * heads),
+        dict(zip(KILL_TARGETS, (kills, heads, heads), strict=True)),
+        2.0 * undisturbed_s / (kills + 2 * heads),
         Random(seed),
     )
-    calls, lakes = 0, [place / "killed"]
-    while (killer.left or len(_runs(lakes[-1])) < clips) and time.monotonic() - begin < SLOWEST_S:
+    calls, lakes = 0, [folder / "killed"]
+    while (killer.left or len(_runs(lakes[-1])) < clips) and time.monotonic() - begin < MAX_FILL_S:
         if len(_runs(lakes[-1])) == clips:
-            lakes.append(place / f"killed-{len(lakes)}")
+            lakes.append(folder / f"killed-{len(lakes)}")
         progress(f"{len(_runs(lakes[-1]))} of {clips} runs, {sum(killer.left.values())} kills left")
         calls += 1
-        killer.disturb(_begun(footage, lakes[-1]))
-    rows = [_differences(place / "whole", each) for each in lakes]
+        killer.kill_during(_start_filling(clip_folder, lakes[-1]))
+    rows = [_differences(folder / "whole", lake) for lake in lakes]
     return {
         "clips": clips,
         **killer.done,
         "calls": calls,
         "lakes": len(lakes),
-        "rows": sum(r[0] for r in rows),
-        "different": sum(r[1] for r in rows),
+        "rows": sum(counts[0] for counts in rows),
+        "different": sum(counts[1] for counts in rows),
     }
 
 
-def _begun(footage: Path, lake: Path) -> subprocess.Popen[bytes]:
-    words = ["archive", "run", str(footage), "--into", str(lake), "--workers", str(WORKERS)]
+def _start_filling(clip_folder: Path, lake: Path) -> subprocess.Popen[bytes]:
+    arguments = ["archive", "run", str(clip_folder), "--into", str(lake), "--workers", str(WORKERS)]
     return subprocess.Popen(
-        [sys.executable, "-m", "visup.cli", *words, "--retry"],
+        [sys.executable, "-m", "visup.cli", *arguments, "--retry"],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
 
 
 def _wait(process: subprocess.Popen[bytes]) -> None:
-    if process.wait(SLOWEST_S) not in (0, 1):
+    if process.wait(MAX_FILL_S) not in (0, 1):
         raise OutputError(f"`visup archive run` ended with {process.returncode}")
 
 
@@ -136,7 +148,7 @@ class RandomKills:
         left = {kind: self._wanted[kind] - self.done[kind] for kind in self._wanted}
         return {kind: count for kind, count in left.items() if count > 0}
 
-    def disturb(self, process: subprocess.Popen[bytes]) -> None:
+    def kill_during(self, process: subprocess.Popen[bytes]) -> None:
         """Kill processes of one call of the command, perhaps the command itself, until it has ended."""
         while process.poll() is None:
             time.sleep(self._rng.uniform(0.0, self._pause_s))
@@ -151,22 +163,24 @@ class RandomKills:
 
     def _victims(self, command: int, kind: str) -> list[int]:
         """The processes to kill at once: one worker, one parent of workers, or all."""
-        starters, everybody = _family(command)
+        starters, descendants = _process_tree(command)
         if kind == "heads":
-            return [command, *everybody]
-        those = starters if kind == "starters" else sorted({*everybody} - {*starters})
-        return [self._rng.choice(those)] if those else []
+            return [command, *descendants]
+        candidates = starters if kind == "starters" else sorted({*descendants} - {*starters})
+        return [self._rng.choice(candidates)] if candidates else []
 
 
-def _family(process: int) -> tuple[list[int], list[int]]:
+def _process_tree(process: int) -> tuple[list[int], list[int]]:
     """The children of a process, and all its descendants."""
     psutil = imported("psutil")
     try:
         command = psutil.Process(process)
-        below = [[p.pid for p in command.children(recursive=deep)] for deep in (False, True)]
+        descendants = [
+            [p.pid for p in command.children(recursive=recursive)] for recursive in (False, True)
+        ]
     except psutil.Error:
         return [], []
-    return below[0], below[1]
+    return descendants[0], descendants[1]
 
 
 def _kill(processes: list[int]) -> None:
@@ -183,7 +197,7 @@ def _runs(lake: Path) -> list[str]:
 
 
 def _differences(one: Path, other: Path) -> tuple[int, int]:
-    """Number of rows, and of different ones."""
+    """Number of compared rows, and of different ones."""
     rows = different = 0
     for name in TABLES:
         first, second = list(Lake(one).rows(name)), list(Lake(other).rows(name))

@@ -11,7 +11,7 @@ from visup.archive.finding.search import find, read_search
 from visup.archive.joining.manifest import read_manifest
 from visup.archive.lake import Lake
 from visup.archive.querying.database import LakeDatabase, open_database
-from visup.evaluation.archive.multiplied import lend_recordings, multiply
+from visup.evaluation.archive.synthetic_lake import link_recordings, multiply_lake
 from visup.evaluation.figures import Progress
 
 PATTERNS = {
@@ -19,7 +19,7 @@ PATTERNS = {
     " and then diverging(arm, satellite) within 5 s",
     "anybody": "converging(a, b) and then touching(a, b) and then diverging(a, b) within 5 s",
 }
-QUESTIONS = {
+QUERIES = {
     "durations": "SELECT task, stage, count(*) AS runs, median(took) AS median_s,"
     " quantile_cont(took, 0.9) AS p90_s FROM (SELECT run, task, stage, sum(seconds) AS took FROM stages"
     " WHERE status IN ('active', 'progressing', 'paused', 'stalled') GROUP BY ALL) GROUP BY ALL",
@@ -31,13 +31,13 @@ QUESTIONS = {
 
 
 def time_large_lake(
-    small: Lake, place: Path, runs: int, rows: int, seed: int, progress: Progress
+    small: Lake, folder: Path, runs: int, rows: int, seed: int, progress: Progress
 ) -> dict[str, Any]:
     """Create a large lake and query it.
 
     Args:
         small: The lake that is multiplied.
-        place: A folder, new or with the large lake of an earlier call.
+        folder: A folder, new or with the large lake of an earlier call.
         runs: Number of runs.
         rows: Approximate number of rows of relations and events.
         seed: Random seed.
@@ -49,50 +49,50 @@ def time_large_lake(
         evaluation of these runs, for the pattern with names, warm, on one core; for each question
         `sql_NAME_s`, warm; `memory_mb`, the peak memory.
     """
-    if (place / "lake.json").exists():
-        lake = Lake.open(place)
+    if (folder / "lake.json").exists():
+        lake = Lake.open(folder)
     else:
-        lake, _ = multiply(small, place, runs, rows, seed, progress)
+        lake, _ = multiply_lake(small, folder, runs, rows, seed, progress)
     progress("asking")
-    ((_, found),) = _alone(lake, small)
-    sizes = (f.stat().st_size for f in place.rglob("*.parquet"))
-    parts = read_manifest(place).partitions
-    return {"runs": len(lake.runs()), "partitions": len(parts), "gb": sum(sizes) / 1e9, **found}
+    ((_, figures),) = _measure_in_fresh_process(lake, small)
+    sizes = (file.stat().st_size for file in folder.rglob("*.parquet"))
+    parts = read_manifest(folder).partitions
+    return {"runs": len(lake.runs()), "partitions": len(parts), "gb": sum(sizes) / 1e9, **figures}
 
 
-def _alone(lake: Lake, small: Lake) -> list[tuple[Any, dict[str, Any]]]:
+def _measure_in_fresh_process(lake: Lake, small: Lake) -> list[tuple[Any, dict[str, Any]]]:
     """Query in a fresh process, to measure its memory."""
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import get_context
 
     with ProcessPoolExecutor(1, get_context("spawn")) as pool:
-        return [(lake, pool.submit(_answers, lake, small).result())]
+        return [(lake, pool.submit(_measure_queries, lake, small).result())]
 
 
-def _answers(lake: Lake, small: Lake) -> dict[str, Any]:
-    found: dict[str, Any] = {}
+def _measure_queries(lake: Lake, small: Lake) -> dict[str, Any]:
+    figures: dict[str, Any] = {}
     begin = time.perf_counter()
     with open_database(lake) as database:
-        found["open_s"] = time.perf_counter() - begin
+        figures["open_s"] = time.perf_counter() - begin
         for name, pattern in PATTERNS.items():
-            found |= _pattern_figures(lake, database, name, pattern)
-        for name, sql in QUESTIONS.items():
-            found[f"sql_{name}_s"] = min(_timed(database, sql) for _ in range(3))
-        lend_recordings(small, lake, read_search(PATTERNS["named"]).possible_runs(database))
-        rounds = [_find(lake, database) for _ in range(3)]
-    found["find_s"], found["find_cpu_s"] = min(rounds)
+            figures |= _pattern_figures(lake, database, name, pattern)
+        for name, sql in QUERIES.items():
+            figures[f"sql_{name}_s"] = min(_query_seconds(database, sql) for _ in range(3))
+        link_recordings(small, lake, read_search(PATTERNS["named"]).possible_runs(database))
+        search_times = [_time_search(lake, database) for _ in range(3)]
+    figures["find_s"], figures["find_cpu_s"] = min(search_times)
     # Linux gives kilobytes.
-    found["memory_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    return found
+    figures["memory_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    return figures
 
 
-def _find(lake: Lake, database: LakeDatabase) -> tuple[float, float]:
+def _time_search(lake: Lake, database: LakeDatabase) -> tuple[float, float]:
     """Elapsed and processor seconds of searching the pattern with names."""
-    begin, busy = time.perf_counter(), time.process_time()
+    begin, cpu_begin = time.perf_counter(), time.process_time()
     search = read_search(PATTERNS["named"])
     for _ in find(lake, search, search.possible_runs(database), 0):
         pass
-    return time.perf_counter() - begin, time.process_time() - busy
+    return time.perf_counter() - begin, time.process_time() - cpu_begin
 
 
 def _pattern_figures(lake: Lake, database: LakeDatabase, name: str, pattern: str) -> dict[str, Any]:
@@ -108,7 +108,7 @@ def _pattern_figures(lake: Lake, database: LakeDatabase, name: str, pattern: str
     }
 
 
-def _timed(database: LakeDatabase, sql: str) -> float:
+def _query_seconds(database: LakeDatabase, sql: str) -> float:
     begin = time.perf_counter()
     database.ask(sql)
     return time.perf_counter() - begin

@@ -14,8 +14,8 @@ from visup.evaluation.archive.chunking import compare_chunks
 from visup.evaluation.archive.exactness import compare_find
 from visup.evaluation.archive.kills import compare_killed
 from visup.evaluation.archive.large_lake import time_large_lake
-from visup.evaluation.archive.recorded import lake_of_missions
 from visup.evaluation.archive.scheduling import measure_scheduler
+from visup.evaluation.archive.simulated_lake import lake_of_missions
 from visup.evaluation.archive.throughput import measure_throughput
 from visup.evaluation.figures import Progress, silent
 from visup.evaluation.missions.files import mission_folders
@@ -58,48 +58,48 @@ class _Evaluation:
     missions: Sequence[Path]
     sizes: ArchiveSizes
     seed: int
-    place: Path
+    folder: Path
     progress: Progress
     models: Path | None = None
-    small: Lake | None = None
+    small_lake: Lake | None = None
 
-    def recorded(self) -> Lake:
+    def simulated_lake(self) -> Lake:
         """The lake of simulated runs, created on demand."""
-        if self.small is None:
-            of = self.missions, 1, self.sizes.every, self.progress
-            self.small = lake_of_missions(self.place, *of)
-        return self.small
+        if self.small_lake is None:
+            arguments = self.missions, 1, self.sizes.every, self.progress
+            self.small_lake = lake_of_missions(self.folder, *arguments)
+        return self.small_lake
 
     def exact(self) -> Mapping[str, Any]:
-        lake, count = self.recorded(), self.sizes.formulas
-        return compare_find(lake, count, self.seed, self.place, self.progress)
+        lake, count = self.simulated_lake(), self.sizes.formulas
+        return compare_find(lake, count, self.seed, self.folder, self.progress)
 
     def kills(self) -> Mapping[str, Any]:
         kills = self.sizes.kills
         heads = -(-kills // 10)
-        place = self.place / "kills"
-        return compare_killed(place, self.sizes.clips, kills, heads, self.seed, self.progress)
+        folder = self.folder / "kills"
+        return compare_killed(folder, self.sizes.clips, kills, heads, self.seed, self.progress)
 
     def large(self) -> Mapping[str, Any]:
-        runs, place = self.sizes.runs, self.place / "large"
+        runs, folder = self.sizes.runs, self.folder / "large"
         rows = runs * ROWS_PER_RUN
-        return time_large_lake(self.recorded(), place, runs, rows, self.seed, self.progress)
+        return time_large_lake(self.simulated_lake(), folder, runs, rows, self.seed, self.progress)
 
     def throughput(self) -> Mapping[str, Any]:
-        place = self.place / "throughput"
-        place.mkdir()
-        of = self.sizes.frames, self.sizes.rounds
-        return measure_throughput(place, self.missions, *of, self.progress)
+        folder = self.folder / "throughput"
+        folder.mkdir()
+        sizes = self.sizes.frames, self.sizes.rounds
+        return measure_throughput(folder, self.missions, *sizes, self.progress)
 
     def scheduler(self) -> Mapping[str, Any]:
         return measure_scheduler(self.sizes.workers, self.sizes.jobs, self.progress)
 
     def chunks(self) -> Mapping[str, Any]:
-        place, folder = self.place / "chunks", self.missions[0].parent
-        place.mkdir()
+        folder, mission_folder = self.folder / "chunks", self.missions[0].parent
+        folder.mkdir()
         missions = self.missions[: self.sizes.watched]
-        models = self.models or mission_database(folder, missions, place, self.progress)
-        return compare_chunks(place, missions, models, self.progress)
+        models = self.models or mission_database(mission_folder, missions, folder, self.progress)
+        return compare_chunks(folder, missions, models, self.progress)
 
 
 PARTS: Mapping[str, Callable[[_Evaluation], Mapping[str, Any]]] = {
@@ -144,8 +144,10 @@ def evaluate_archive(
         )
     missions = mission_folders(folder)
     with tempfile.TemporaryDirectory() as scratch:
-        made = _Evaluation(missions, ArchiveSizes(**sizes), seed, Path(scratch), progress, models)
-        items = {name: dict(PARTS[name](made)) for name in wanted}
+        evaluation = _Evaluation(
+            missions, ArchiveSizes(**sizes), seed, Path(scratch), progress, models
+        )
+        items = {name: dict(PARTS[name](evaluation)) for name in wanted}
     return {"items": items, "total": {"different": sum(_different(i) for i in items.values())}}
 
 

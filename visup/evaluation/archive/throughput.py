@@ -24,12 +24,12 @@ from visup.runs.settings import WatchSettings
 
 
 def measure_throughput(
-    place: Path, missions: Sequence[Path], frames: int, rounds: int, progress: Progress
+    folder: Path, missions: Sequence[Path], frames: int, rounds: int, progress: Progress
 ) -> dict[str, Any]:
     """Process the beginnings of missions in turn plainly, into a lake, by one worker, and by two.
 
     Args:
-        place: A working folder.
+        folder: A working folder.
         missions: Folders with `video.mp4`.
         frames: Frames per mission.
         rounds: Number of repetitions; ratios are medians over them.
@@ -40,34 +40,34 @@ def measure_throughput(
         relative `overhead` of a lake over plain watching in one process, and `overhead_cpu`, the same in
         processor time, which depends less on the load of the machine.
     """
-    clips = [_beginning(m / "video.mp4", place / f"{m.name}.avi", frames) for m in missions]
-    taken: dict[str, list[float]] = {name: [] for name in ("plain", "lake", "one", "two")}
-    busy: dict[str, list[float]] = {name: [] for name in taken}
+    clips = [_first_frames(m / "video.mp4", folder / f"{m.name}.avi", frames) for m in missions]
+    elapsed: dict[str, list[float]] = {name: [] for name in ("plain", "lake", "one", "two")}
+    cpu: dict[str, list[float]] = {name: [] for name in elapsed}
     video_s = 0.0
     with open_pool(PoolSettings(workers=1)) as one, open_pool(PoolSettings(workers=2)) as two:
         for pool in (one, two):  # warm up the workers
-            _filled(place / "warm", clips, pool)
-        _plain(place / "warm-run", clips)
+            _fill_lake(folder / "warm", clips, pool)
+        _watch_plainly(folder / "warm-run", clips)
         for number in range(rounds):
             progress(f"round {number + 1} of {rounds}")
-            ways: Mapping[str, Callable[[], float]] = {
-                "plain": partial(_plain, place / "run", clips),
-                "lake": partial(_filled, place / "lake", clips, Pool()),
-                "one": partial(_filled, place / "one", clips, one),
-                "two": partial(_filled, place / "two", clips, two),
+            methods: Mapping[str, Callable[[], float]] = {
+                "plain": partial(_watch_plainly, folder / "run", clips),
+                "lake": partial(_fill_lake, folder / "lake", clips, Pool()),
+                "one": partial(_fill_lake, folder / "one", clips, one),
+                "two": partial(_fill_lake, folder / "two", clips, two),
             }
-            for name, way in ways.items():
-                begin, begun = time.perf_counter(), time.process_time()
-                video_s = way()
-                taken[name].append(time.perf_counter() - begin)
-                busy[name].append(time.process_time() - begun)
-    ratios = zip(taken["one"], taken["two"], strict=True)
+            for name, method in methods.items():
+                elapsed_begin, cpu_begin = time.perf_counter(), time.process_time()
+                video_s = method()
+                elapsed[name].append(time.perf_counter() - elapsed_begin)
+                cpu[name].append(time.process_time() - cpu_begin)
+    ratios = zip(elapsed["one"], elapsed["two"], strict=True)
     return {
         "video_s": video_s,
-        **{f"{name}_s": statistics.median(of) for name, of in taken.items()},
+        **{f"{name}_s": statistics.median(times) for name, times in elapsed.items()},
         "speedup": statistics.median(a / b for a, b in ratios),
-        "overhead": _overhead(taken),
-        "overhead_cpu": _overhead(busy),
+        "overhead": _overhead(elapsed),
+        "overhead_cpu": _overhead(cpu),
     }
 
 
@@ -76,15 +76,15 @@ def _overhead(seconds: Mapping[str, Sequence[float]]) -> float:
     return statistics.median(a / b for a, b in costs) - 1.0
 
 
-def _beginning(source: Path, target: Path, frames: int) -> Path:
+def _first_frames(source: Path, target: Path, frames: int) -> Path:
     """The first frames of a video as a clip of its own."""
     reader = cv2.VideoCapture(str(source))
     size = (int(reader.get(cv2.CAP_PROP_FRAME_WIDTH)), int(reader.get(cv2.CAP_PROP_FRAME_HEIGHT)))
     fps = reader.get(cv2.CAP_PROP_FPS)
     writer = cv2.VideoWriter(str(target), cv2.VideoWriter.fourcc(*"MJPG"), fps, size)
     for _ in range(frames):
-        there, image = reader.read()
-        if not there:
+        has_frame, image = reader.read()
+        if not has_frame:
             break
         writer.write(image)
     writer.release()
@@ -92,24 +92,24 @@ def _beginning(source: Path, target: Path, frames: int) -> Path:
     return target
 
 
-def _plain(folder: Path, clips: Sequence[Path]) -> float:
+def _watch_plainly(folder: Path, clips: Sequence[Path]) -> float:
     """Watch clips into run folders; returns 0 seconds of video, which only a lake reports."""
     for number, clip in enumerate(clips):
-        place = folder / str(number)
-        place.mkdir(parents=True)
-        watch_into(WatchSettings(str(clip)), place)
+        run_folder = folder / str(number)
+        run_folder.mkdir(parents=True)
+        watch_into(WatchSettings(str(clip)), run_folder)
     shutil.rmtree(folder)
     return 0.0
 
 
-def _filled(folder: Path, clips: Sequence[Path], pool: Pool) -> float:
+def _fill_lake(folder: Path, clips: Sequence[Path], pool: Pool) -> float:
     """Fill a new lake; returns the seconds of video."""
     lake = Lake.create(folder)
-    plan = make_plan(lake, [Clip(c, taken=0.0) for c in clips], WatchSettings(""))
-    result = fill(lake, plan, pool, _silent)
+    plan = make_plan(lake, [Clip(clip, taken=0.0) for clip in clips], WatchSettings(""))
+    result = fill(lake, plan, pool, _ignore_outcome)
     shutil.rmtree(folder)
     return result.video_s
 
 
-def _silent(outcome: ClipOutcome) -> None:
+def _ignore_outcome(outcome: ClipOutcome) -> None:
     """Ignore an outcome."""

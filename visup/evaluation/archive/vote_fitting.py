@@ -17,16 +17,16 @@ from visup.agent import Mind
 from visup.agent.model.object_beliefs import UNKNOWN_OBJECT
 from visup.agent.model.step import Step
 from visup.archive.lake import Lake
-from visup.evaluation.archive.calibrating import RunTruth
+from visup.evaluation.archive.reliability import RunTruth
 from visup.rules.identity.votes import ObjectVotes, VoteSettings, object_votes
 from visup.runs.replay import replay
 from visup.runs.settings import MAX_EVIDENCE
 
-LEAST_EVIDENCE = 0.05
-SPREAD = 0.5
-"""Standard deviation of the prior of the log factor: about two thirds more or less than the shipped value."""
-FEWEST = 10
-"""Minimum number of labelled objects."""
+MIN_EVIDENCE = 0.05
+PRIOR_SIGMA = 0.5
+"""Standard deviation of the log-normal prior: about two thirds more or less than the shipped value."""
+MIN_LABELLED = 10
+"""Minimum number of labelled objects; with fewer the prior alone would decide."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,11 +45,11 @@ class LabelledVotes:
 
     def likelihood(self, evidence: float) -> float:
         """The probability of the truth for a weight of votes."""
-        said = {**self.votes, UNKNOWN_OBJECT: self.none}
-        most = max(said.values())
-        odds = {name: exp(evidence * (v - most)) for name, v in said.items()}
-        true = odds.get(self.truth, exp(-evidence * most))
-        return true / (sum(odds.values()) + (0.0 if self.truth in odds else true))
+        votes = {**self.votes, UNKNOWN_OBJECT: self.none}
+        max_votes = max(votes.values())
+        odds = {name: exp(evidence * (v - max_votes)) for name, v in votes.items()}
+        true_odds = odds.get(self.truth, exp(-evidence * max_votes))
+        return true_odds / (sum(odds.values()) + (0.0 if self.truth in odds else true_odds))
 
 
 def fitted_evidence(labelled: Sequence[LabelledVotes]) -> float | None:
@@ -60,16 +60,16 @@ def fitted_evidence(labelled: Sequence[LabelledVotes]) -> float | None:
     >>> fitted_evidence([sure, wrong] * 10) < VoteSettings().evidence < fitted_evidence([sure] * 20)
     True
     """
-    if len(labelled) < FEWEST:
+    if len(labelled) < MIN_LABELLED:
         return None
-    usual = log(VoteSettings().evidence)
+    default_log = log(VoteSettings().evidence)
 
-    def cost(x: float) -> float:
-        misfit = -sum(log(max(1e-12, one.likelihood(exp(x)))) for one in labelled)
-        return misfit + 0.5 * ((x - usual) / SPREAD) ** 2
+    def cost(log_evidence: float) -> float:
+        loss = -sum(log(max(1e-12, votes.likelihood(exp(log_evidence)))) for votes in labelled)
+        return loss + 0.5 * ((log_evidence - default_log) / PRIOR_SIGMA) ** 2
 
-    found = minimize_scalar(cost, bounds=(log(LEAST_EVIDENCE), log(MAX_EVIDENCE)), method="bounded")
-    return float(exp(found.x))
+    minimum = minimize_scalar(cost, bounds=(log(MIN_EVIDENCE), log(MAX_EVIDENCE)), method="bounded")
+    return float(exp(minimum.x))
 
 
 def labelled_votes(lake: Lake, truth: Mapping[str, RunTruth]) -> Iterator[LabelledVotes]:
@@ -87,17 +87,17 @@ def labelled_votes(lake: Lake, truth: Mapping[str, RunTruth]) -> Iterator[Labell
             continue
         mind = Mind()
 
-        def look(step: Step) -> None:
+        def keep_mind(step: Step) -> None:
             nonlocal mind
             mind = step.mind
 
-        replay(*lake.recorded(run), on_step=look)
+        replay(*lake.recorded(run), on_step=keep_mind)
         for number, belief in sorted(mind.objects.items()):
             name = truth[run].objects.get(str(number))
-            counted = object_votes(mind, number)
-            if name is not None and belief.confirmed and counted.last_matched is not None:
-                yield _labelled(counted, name)
+            votes = object_votes(mind, number)
+            if name is not None and belief.confirmed and votes.last_matched is not None:
+                yield _labelled(votes, name)
 
 
-def _labelled(counted: ObjectVotes, name: str) -> LabelledVotes:
-    return LabelledVotes(dict(counted.counts), counted.none, name)
+def _labelled(votes: ObjectVotes, name: str) -> LabelledVotes:
+    return LabelledVotes(dict(votes.counts), votes.none, name)

@@ -16,7 +16,7 @@ from visup.evaluation.calibration import Calibration
 
 COLUMNS = ("source", "verdict", "objects", "stages")
 KINDS = ("identity", "stage", "verdict")
-SAID = {
+STATEMENT_QUERIES = {
     "identity": (
         "SELECT run, object::VARCHAR, name, confidence FROM lake.objects WHERE confirmed ORDER BY ALL"
     ),
@@ -40,11 +40,11 @@ class RunTruth:
     objects: Mapping[str, str]
     stages: Mapping[str, str]
 
-    def of(self, kind: str, what: str) -> str | None:
+    def of(self, kind: str, subject: str) -> str | None:
         """The true value of a subject, or None if not known."""
         if kind == "verdict":
             return self.verdict or None
-        return (self.objects if kind == "identity" else self.stages).get(what)
+        return (self.objects if kind == "identity" else self.stages).get(subject)
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,16 +80,16 @@ def read_truth(path: Path) -> dict[str, RunTruth]:
     """
     try:
         reader = csv.DictReader(StringIO(read_text_file(path, MAX_MANIFEST_BYTES)), strict=True)
-        head = reader.fieldnames or ()
-        if "source" not in head or set(head) - set(COLUMNS):
+        header = reader.fieldnames or ()
+        if "source" not in header or set(header) - set(COLUMNS):
             raise SourceError(
-                f"the head is: {', '.join(head)}",
+                f"the head is: {', '.join(header)}",
                 where=str(path),
                 expected=f"source, and some of: {', '.join(COLUMNS[1:])}",
             )
         rows = [(reader.line_num, row) for row in reader]
-    except (OSError, UnicodeDecodeError, csv.Error) as fault:
-        raise SourceError(f"the truth cannot be read ({fault})", where=str(path)) from fault
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise SourceError(f"the truth cannot be read ({error})", where=str(path)) from error
     return {
         row["source"]: RunTruth(
             (row.get("verdict") or "").strip(),
@@ -110,10 +110,10 @@ def truth_by_run(database: LakeDatabase, truth: Mapping[str, RunTruth]) -> Mappi
     Raises:
         SourceError: No run of the lake has a known truth.
     """
-    named = database.ask("SELECT run, source FROM lake.runs").to_pylist()
+    runs = database.ask("SELECT run, source FROM lake.runs").to_pylist()
     known = {
         row["run"]: truth[name]
-        for row in named
+        for row in runs
         for name in (row["source"], PurePath(row["source"]).name)
         if name in truth
     }
@@ -125,55 +125,57 @@ def truth_by_run(database: LakeDatabase, truth: Mapping[str, RunTruth]) -> Mappi
     return known
 
 
-def reliabilities(database: LakeDatabase, known: Mapping[str, RunTruth]) -> tuple[Reliability, ...]:
+def reliabilities(database: LakeDatabase, truth: Mapping[str, RunTruth]) -> tuple[Reliability, ...]:
     """The reliability by kind, for kinds with known truth.
 
     Args:
         database: The lake.
-        known: The truth of its runs by key.
+        truth: The truth of its runs by key.
     """
-    found = ((kind, list(_judged(database, kind, known))) for kind in KINDS)
-    return tuple(reliability(kind, said) for kind, said in found if said)
+    by_kind = ((kind, list(_checked_statements(database, kind, truth))) for kind in KINDS)
+    return tuple(reliability(kind, statements) for kind, statements in by_kind if statements)
 
 
-def reliability(kind: str, said: Sequence[tuple[float, bool]]) -> Reliability:
+def reliability(kind: str, statements: Sequence[tuple[float, bool]]) -> Reliability:
     """Compute the reliability of confidences.
 
     Args:
         kind: Kind of statement.
-        said: Confidence (0 to 1), and whether it was correct; at least one.
+        statements: Confidence (0 to 1), and whether it was correct; at least one.
 
     >>> reliability("verdict", [(0.75, True), (0.75, True), (0.75, True), (0.75, False)]).error
     0.0
     """
-    counted = Calibration()
-    for confidence, is_right in said:
-        counted.add(confidence, is_right)
-    squares = ((confidence - is_right) ** 2 for confidence, is_right in said)
+    calibration = Calibration()
+    for confidence, correct in statements:
+        calibration.add(confidence, correct)
+    squared_errors = ((confidence - correct) ** 2 for confidence, correct in statements)
     return Reliability(
         kind,
-        len(said),
-        sum(is_right for _, is_right in said) / len(said),
-        counted.error() or 0.0,
-        sum(squares) / len(said),
-        tuple(counted.table()),
+        len(statements),
+        sum(correct for _, correct in statements) / len(statements),
+        calibration.error() or 0.0,
+        sum(squared_errors) / len(statements),
+        tuple(calibration.table()),
     )
 
 
-def _judged(
-    database: LakeDatabase, kind: str, known: Mapping[str, RunTruth]
+def _checked_statements(
+    database: LakeDatabase, kind: str, truth: Mapping[str, RunTruth]
 ) -> Iterator[tuple[float, bool]]:
-    table = database.ask(SAID[kind])
-    for run, what, told, confidence in zip(*(c.to_pylist() for c in table.columns), strict=True):
-        true = known[run].of(kind, what) if run in known else None
-        if true is not None:
-            yield float(confidence), told == true
+    table = database.ask(STATEMENT_QUERIES[kind])
+    for run, subject, reported, confidence in zip(
+        *(column.to_pylist() for column in table.columns), strict=True
+    ):
+        true_value = truth[run].of(kind, subject) if run in truth else None
+        if true_value is not None:
+            yield float(confidence), reported == true_value
 
 
 def _pairs(text: str | None, where: str) -> dict[str, str]:
-    parts = [p.strip() for p in (text or "").split(";") if p.strip()]
-    if bad := [p for p in parts if "=" not in p]:
+    parts = [part.strip() for part in (text or "").split(";") if part.strip()]
+    if malformed := [part for part in parts if "=" not in part]:
         raise SourceError(
-            f"'{bad[0]}' says nothing", where=where, expected="such as: 1=spartan;2=arm"
+            f"'{malformed[0]}' says nothing", where=where, expected="such as: 1=spartan;2=arm"
         )
-    return {k.strip(): v.strip() for k, _, v in (p.partition("=") for p in parts)}
+    return {key.strip(): value.strip() for key, _, value in (part.partition("=") for part in parts)}

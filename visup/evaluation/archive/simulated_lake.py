@@ -19,12 +19,12 @@ from visup.version import __version__
 
 
 def lake_of_missions(
-    place: Path, missions: Sequence[Path], seeds: int, every: int, progress: Progress
+    folder: Path, missions: Sequence[Path], seeds: int, every: int, progress: Progress
 ) -> Lake:
     """A lake of missions, each simulated with several noise seeds.
 
     Args:
-        place: A folder for it and the journals.
+        folder: A folder for it and the journals.
         missions: Folders with `mission.json`, `truth.json` and `masks/`.
         seeds: Runs of each mission.
         every: Use every n-th frame.
@@ -33,12 +33,12 @@ def lake_of_missions(
     Raises:
         SettingsError: A mission cannot be read.
     """
-    lake = Lake.create(place / "recorded")
-    for number, folder in enumerate(missions):
-        mission = load_mission(folder, every=every)
+    lake = Lake.create(folder / "recorded")
+    for number, mission_folder in enumerate(missions):
+        mission = load_mission(mission_folder, every=every)
         for seed in range(seeds):
-            progress(f"{folder.name}, seed {seed}")
-            run = place / "runs" / f"{folder.name}-{seed}"
+            progress(f"{mission_folder.name}, seed {seed}")
+            run = folder / "runs" / f"{mission_folder.name}-{seed}"
             record_mission(run, mission, PerceptNoise(seed=seed * len(missions) + number), every)
             add_run(lake, run)
     return lake
@@ -47,11 +47,11 @@ def lake_of_missions(
 def record_mission(run: Path, mission: Mission, noise: PerceptNoise, every: int) -> None:
     """Record a simulated run of a mission in a new folder."""
     run.mkdir(parents=True)
-    told = mission.description
+    description = mission.description
     settings = WatchSettings(
         f"{run.name}.mp4",
-        tasks=(str(told["task"]),),
-        actors={actor: (model,) for actor, model in told["actors"].items()},
+        tasks=(str(description["task"]),),
+        actors={actor: (model,) for actor, model in description["actors"].items()},
     )
     agent, journal = reasoning_agent(settings), Journal(run / JOURNAL)
     facts = {"visup": __version__, "source": settings.source, "fps": mission.fps / every}
