@@ -12,12 +12,12 @@ from rich.console import Console
 from visup.agent.model.errors import SettingsError
 from visup.commands.eval.tables import clips_table
 from visup.evaluation.motion.rendered_clips import (
-    MARK,
+    DIGEST_FILE,
     Bar,
     bar_of,
+    compare_with_bar,
     evaluate_clips,
-    judged,
-    rendered,
+    rendered_clip,
 )
 from visup.render.imaging.renderer import Renderer
 from visup.render.scenario.library import (
@@ -82,12 +82,12 @@ def test_bench_clips_are_found_by_folder_and_name() -> None:
 
 def test_figures_are_compared_with_the_limits() -> None:
     good = {"objects": {"dog": {"J": 0.8, "id_switches": 0}}, "id_switches": 0, "ghost": 0.01}
-    assert judged(good, Bar())["missed"] == []
-    assert judged({**good, "ghost": 0.011}, Bar())["missed"] == ["ghosts 1.1% > 1%"]
-    assert judged({**good, "id_switches": 1}, Bar())["missed"] == ["1 id switches > 0"]
+    assert compare_with_bar(good, Bar())["missed"] == []
+    assert compare_with_bar({**good, "ghost": 0.011}, Bar())["missed"] == ["ghosts 1.1% > 1%"]
+    assert compare_with_bar({**good, "id_switches": 1}, Bar())["missed"] == ["1 id switches > 0"]
     poor = {**good, "objects": {"dog": {"J": 0.79, "id_switches": 0}}}
-    assert judged(poor, Bar())["missed"] == ["J of dog 0.79 < 0.80"]
-    assert judged({"ghost": 0.0}, Bar())["missed"] == ["no object was scored"]
+    assert compare_with_bar(poor, Bar())["missed"] == ["J of dog 0.79 < 0.80"]
+    assert compare_with_bar({"ghost": 0.0}, Bar())["missed"] == ["no object was scored"]
     assert all(bar_of(name).id_switches == 0 for name in bench_names())
 
 
@@ -96,13 +96,13 @@ def test_a_clip_is_rendered_again_only_if_its_scenario_changed(
 ) -> None:
     tiny = small("slow").model_copy(update={"duration_s": 0.08})
     monkeypatch.setattr("visup.evaluation.motion.rendered_clips.shipped_scenario", lambda _: tiny)
-    folder = rendered("slow", tmp_path)
+    folder = rendered_clip("slow", tmp_path)
     assert len(list((folder / "masks").iterdir())) == 2
     modified = (folder / "truth.json").stat().st_mtime_ns
-    assert rendered("slow", tmp_path) == folder
+    assert rendered_clip("slow", tmp_path) == folder
     assert (folder / "truth.json").stat().st_mtime_ns == modified
-    (folder / MARK).write_text("of another scenario\n")
-    rendered("slow", tmp_path)
+    (folder / DIGEST_FILE).write_text("of another scenario\n")
+    rendered_clip("slow", tmp_path)
     assert (folder / "truth.json").stat().st_mtime_ns > modified
 
 

@@ -63,44 +63,51 @@ def test_j_by_hand_and_unscored_pixels() -> None:
     assert region_similarity(a, none, np.ones_like(a)) == 0
 
 
-def slow_f(seen: np.ndarray, true: np.ndarray, reach: int) -> float:
+def brute_force_f(predicted: np.ndarray, ground_truth: np.ndarray, tolerance_px: int) -> float:
     """The boundary measure by comparing every pair of boundary pixels."""
-    a, b = np.argwhere(boundary(seen)), np.argwhere(boundary(true))
+    a, b = np.argwhere(boundary(predicted)), np.argwhere(boundary(ground_truth))
     if len(a) == 0 or len(b) == 0:
         return float(len(a) == len(b))
-    far = ((a[:, None] - b[None]) ** 2).sum(-1) > reach**2
+    far = ((a[:, None] - b[None]) ** 2).sum(-1) > tolerance_px**2
     precision, recall = 1 - far.all(1).mean(), 1 - far.all(0).mean()
     return 2 * precision * recall / (precision + recall) if precision + recall else 0.0
 
 
 @given(masks, masks)
 @settings(max_examples=60, deadline=None)
-def test_f_agrees_with_its_slow_twin(a: np.ndarray, b: np.ndarray) -> None:
-    reach = int(np.ceil(0.05 * np.hypot(*a.shape)))
-    assert boundary_measure(a, b, 0.05) == pytest.approx(slow_f(a, b, reach))
+def test_f_agrees_with_brute_force(a: np.ndarray, b: np.ndarray) -> None:
+    tolerance_px = int(np.ceil(0.05 * np.hypot(*a.shape)))
+    assert boundary_measure(a, b, 0.05) == pytest.approx(brute_force_f(a, b, tolerance_px))
 
 
-def test_f_forgives_a_pixel_and_not_ten() -> None:
+def test_f_tolerates_an_error_of_one_pixel_but_not_of_ten() -> None:
     assert boundary_measure(square(10, 10), square(10, 10)) == 1
     assert boundary_measure(square(10, 10), square(11, 10)) == 1
     assert boundary_measure(square(10, 10), square(20, 20, 30)) < 0.5
 
 
 @given(st.lists(st.tuples(masks, masks, masks), min_size=1, max_size=4))
-def test_the_f_measure_is_of_all_scored_pixels_at_once(
+def test_the_f_measure_counts_all_scored_pixels_together(
     frames: list[tuple[np.ndarray, np.ndarray, np.ndarray]],
 ) -> None:
     counts = PixelCounts()
-    for seen, true, scored in frames:
-        counts = counts.with_frame(seen, true, scored)
-    seen, true, scored = (np.concatenate([f[k].ravel() for f in frames]) for k in range(3))
-    found, there = seen[scored], true[scored]
-    assert (counts.right, counts.false) == (np.sum(found & there), np.sum(found & ~there))
-    assert counts.missed == np.sum(there & ~found)
-    union = np.sum(found | there)
-    j = np.sum(found & there) / union if union else 1.0
+    for predicted, ground_truth, scored in frames:
+        counts = counts.with_frame(predicted, ground_truth, scored)
+    predicted, ground_truth, scored = (
+        np.concatenate([f[k].ravel() for f in frames]) for k in range(3)
+    )
+    positive, actual = predicted[scored], ground_truth[scored]
+    assert (counts.true_positives, counts.false_positives) == (
+        np.sum(positive & actual),
+        np.sum(positive & ~actual),
+    )
+    assert counts.false_negatives == np.sum(actual & ~positive)
+    union = np.sum(positive | actual)
+    j = np.sum(positive & actual) / union if union else 1.0
     assert counts.f_measure == pytest.approx(2 * j / (1 + j))  # as Dice and Jaccard are related
-    assert counts == PixelCounts().with_frame(seen, true, scored)  # in whatever frames they came
+    assert counts == PixelCounts().with_frame(
+        predicted, ground_truth, scored
+    )  # in whatever frames they came
 
 
 def test_a_ghost_overlaps_no_object_by_a_tenth() -> None:
@@ -136,7 +143,7 @@ def scene(arm_at: int, satellite_at: int) -> tuple[np.ndarray, np.ndarray, np.nd
     return np.where(arm, 2, np.where(satellite, 3, 0)), arm, satellite
 
 
-def test_an_object_is_scored_with_its_one_best_region_from_two_seconds_on() -> None:
+def test_an_object_is_scored_with_its_best_region_from_two_seconds_on() -> None:
     frames = []
     for n in range(100):
         labels, arm, satellite = scene(5, 50)
@@ -149,7 +156,7 @@ def test_an_object_is_scored_with_its_one_best_region_from_two_seconds_on() -> N
     assert scores["arm"].switches == scores["satellite"].switches == 0
 
 
-def test_a_change_of_id_costs_j_and_counts() -> None:
+def test_an_id_switch_is_counted_and_lowers_j() -> None:
     labels, arm, satellite = scene(5, 50)
     frames = [overlaps(n, {(1 if n < 100 else 7): arm, 2: satellite}, labels) for n in range(150)]
     scores = object_scores(frames)
@@ -158,7 +165,7 @@ def test_a_change_of_id_costs_j_and_counts() -> None:
 
 
 @pytest.mark.parametrize("joined", [False, True])
-def test_after_coupled_the_union_counts_as_one(joined: bool) -> None:
+def test_coupled_objects_are_scored_by_their_union(joined: bool) -> None:
     labels, arm, satellite = scene(5, 5)
     frames = []
     for n in range(120):
@@ -169,7 +176,7 @@ def test_after_coupled_the_union_counts_as_one(joined: bool) -> None:
     assert scores["arm"].switches == scores["satellite"].switches == 0
 
 
-def test_boxes_by_hand() -> None:
+def test_box_distances_by_hand() -> None:
     distance = box_distance([(0, 0, 10, 10)], [(0, 0, 10, 10), (0, 0, 10, 5), (20, 0, 10, 10)])
     assert distance[0, 0] == 0
     assert distance[0, 1] == pytest.approx(0.5)
@@ -188,7 +195,7 @@ def test_mot_scores_on_toy_tracks() -> None:
     assert mot_scores(true, {n: {} for n in range(10)})["mota"] == 0.0
 
 
-def test_a_broken_line_of_truth_is_told_with_its_place(tmp_path: Path) -> None:
+def test_a_malformed_line_of_ground_truth_is_reported_with_its_line_number(tmp_path: Path) -> None:
     file = tmp_path / "gt.txt"
     file.write_text("1,1,0,0,5,5,1\n2,1,0,zero,5,5,1\n")
     with pytest.raises(SourceError) as caught:
@@ -196,28 +203,30 @@ def test_a_broken_line_of_truth_is_told_with_its_place(tmp_path: Path) -> None:
     assert str(caught.value.where).endswith(":2")
 
 
-def test_nothing_to_score_is_told(tmp_path: Path) -> None:
+def test_a_folder_without_sequences_is_refused(tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match="nothing to score"):
         find_sequences(tmp_path)
 
 
 def test_sequences_are_found_run_and_scored(tmp_path: Path) -> None:
-    place = tmp_path / "set" / "disc"
+    folder = tmp_path / "set" / "disc"
     for name in ("frames", "masks"):
-        (place / name).mkdir(parents=True)
+        (folder / name).mkdir(parents=True)
     disc = (lambda n: (60 + 2.0 * n, 80.0), 24.0, texture(2, (320, 480), 0, 255))
-    for shot in clip(texture(1, (320, 480)), lambda n: (20, 30), [disc], 25):
-        file = f"{shot.frame.index:05d}.png"
-        cv2.imwrite(str(place / "frames" / file), shot.frame.image)
-        cv2.imwrite(str(place / "masks" / file), np.where(shot.masks[0], 255, 0).astype(np.uint8))
-    told: list[str] = []
-    figures = evaluate_motion(tmp_path, progress=told.append)
-    assert told == ["set/disc"]
+    for labelled in clip(texture(1, (320, 480)), lambda n: (20, 30), [disc], 25):
+        file = f"{labelled.frame.index:05d}.png"
+        cv2.imwrite(str(folder / "frames" / file), labelled.frame.image)
+        cv2.imwrite(
+            str(folder / "masks" / file), np.where(labelled.masks[0], 255, 0).astype(np.uint8)
+        )
+    messages: list[str] = []
+    figures = evaluate_motion(tmp_path, progress=messages.append)
+    assert messages == ["set/disc"]
     item = figures["items"]["set/disc"]
     assert set(item) == {"J", "F", "f_measure", "ghost", "ms", "ratio"}
     assert 0.3 < item["J"] <= 1
     assert figures["total"]["J"] == item["J"]
-    short = evaluate_motion(place, limit=3)["items"]["disc"]
+    short = evaluate_motion(folder, limit=3)["items"]["disc"]
     assert short["J"] < item["J"]
 
 
@@ -228,10 +237,10 @@ def test_a_mission_is_scored_by_object(tmp_path: Path) -> None:
     video = cv2.VideoWriter(
         str(tmp_path / "video.mp4"), cv2.VideoWriter.fourcc(*"mp4v"), 25, SIZE[::-1]
     )
-    for shot in clip(sky, lambda n: (0, 0), [disc], 70):
-        video.write(shot.frame.image)
-        labels = np.where(shot.masks[0], 3, 0).astype(np.uint8)
-        cv2.imwrite(str(tmp_path / "masks" / f"{shot.frame.index:05d}.png"), labels)
+    for labelled in clip(sky, lambda n: (0, 0), [disc], 70):
+        video.write(labelled.frame.image)
+        labels = np.where(labelled.masks[0], 3, 0).astype(np.uint8)
+        cv2.imwrite(str(tmp_path / "masks" / f"{labelled.frame.index:05d}.png"), labels)
     video.release()
     truth = {"labels": {"satellite": 3, "arm": 2}, "events": []}
     (tmp_path / "truth.json").write_text(json.dumps(truth))
@@ -242,22 +251,22 @@ def test_a_mission_is_scored_by_object(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("images", "truth", "places"),
+    ("images", "truth", "indices"),
     [
         (["000001.jpg", "000002.jpg"], [0, 1], [0, 1]),
         (["000003.jpg", "000007.jpg"], [6, 2], [1, 0]),
         (["a.jpg", "b.jpg"], [1], [1]),
     ],
 )
-def test_truth_of_mot_is_that_of_the_images_of_its_numbers(
-    images: list[str], truth: list[int], places: list[int]
+def test_mot_truth_is_matched_to_images_by_number(
+    images: list[str], truth: list[int], indices: list[int]
 ) -> None:
     boxes = {frame: {1: (float(frame), 0.0, 1.0, 1.0)} for frame in truth}
-    found = truth_of_images(boxes, [Path(name) for name in images])
-    assert list(found) == places
-    assert list(found.values()) == list(boxes.values())
+    matched = truth_of_images(boxes, [Path(name) for name in images])
+    assert list(matched) == indices
+    assert list(matched.values()) == list(boxes.values())
 
 
-def test_truth_of_mot_without_its_image_is_refused() -> None:
+def test_mot_truth_without_its_image_is_refused() -> None:
     with pytest.raises(SourceError, match="there is no image of frame 3"):
         truth_of_images({2: {}}, [Path("000001.jpg"), Path("000002.jpg")])

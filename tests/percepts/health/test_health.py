@@ -18,13 +18,13 @@ from tests.paths import SHARED
 from tests.percepts.motion.clips import clip, texture
 from visup.agent import Frame, HealthStatus
 from visup.agent.model.errors import SettingsError
-from visup.evaluation.health.camera_faults import EXPECTED, inject
+from visup.evaluation.health.camera_faults import EXPECTED_STATUS, inject
 from visup.evaluation.health.runner import (
+    back_and_forth,
     evaluate_health,
     find_sources,
-    plan,
+    plan_trials,
     statuses,
-    to_and_fro,
 )
 from visup.percepts.health.frame_timing import ArrivalMonitor
 from visup.percepts.health.image_quality import measure_quality
@@ -88,11 +88,11 @@ def changed(frames: Frames, start: int, change: Callable[[np.ndarray, int], np.n
 
 
 @pytest.mark.parametrize("scene", SCENES)
-@pytest.mark.parametrize("kind", sorted(EXPECTED))
+@pytest.mark.parametrize("kind", sorted(EXPECTED_STATUS))
 def test_each_fault_is_named_within_a_second(scene: Scene, kind: str) -> None:
     for seed in range(2):
         harmed = inject(scene(), START, kind, seed)
-        assert EXPECTED[kind] in within_a_second(harmed), seed
+        assert EXPECTED_STATUS[kind] in within_a_second(harmed), seed
         assert set(told(harmed)[:START]) == {OK}
 
 
@@ -146,7 +146,7 @@ def test_recovery_is_told(kind: str) -> None:
     frames = panning()
     harmed = inject(frames[:40], START, kind, 3)
     said = told([*harmed, *frames[40:]])
-    assert said[39] is EXPECTED[kind]
+    assert said[39] is EXPECTED_STATUS[kind]
     assert set(said[42:]) == {OK}
 
 
@@ -253,13 +253,13 @@ def test_frames_that_come_too_late_and_then_too_early_are_not_missing() -> None:
 
 def test_a_campaign_is_drawn_from_its_seed() -> None:
     sources = [Path("a"), Path("b"), Path("c")]
-    assert list(plan(sources, 30, 4)) == list(plan(sources, 30, 4))
-    assert list(plan(sources, 30, 4)) != list(plan(sources, 30, 5))
-    assert {t.kind for t in plan(sources, 30, 4)} == set(EXPECTED)
-    assert {t.source for t in plan(sources, 3, 4)} == set(sources)
+    assert list(plan_trials(sources, 30, 4)) == list(plan_trials(sources, 30, 4))
+    assert list(plan_trials(sources, 30, 4)) != list(plan_trials(sources, 30, 5))
+    assert {t.kind for t in plan_trials(sources, 30, 4)} == set(EXPECTED_STATUS)
+    assert {t.source for t in plan_trials(sources, 3, 4)} == set(sources)
 
 
-@pytest.mark.parametrize("kind", sorted(EXPECTED))
+@pytest.mark.parametrize("kind", sorted(EXPECTED_STATUS))
 def test_an_injection_spares_what_came_before_and_keeps_time(kind: str) -> None:
     harmed = inject(panning(), START, kind, 9)
     assert harmed[:START] == list(panning()[:START])
@@ -278,7 +278,7 @@ def test_the_campaign_scores_what_is_reported(tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "pan" / "masks" / "0.png"), panning()[0].image)
     assert find_sources(tmp_path) == [place]
     figures = evaluate_health(tmp_path, faults=7, seed=1)
-    assert set(figures["items"]) == set(EXPECTED)
+    assert set(figures["items"]) == set(EXPECTED_STATUS)
     total = figures["total"]
     assert total["clips"] == 7
     assert total["false_reports"] == 0
@@ -302,7 +302,7 @@ def test_shared_video_keeps_the_bar_in_a_quick_look() -> None:
 @given(st.integers(2, 9), st.integers(1, 60))
 def test_a_short_clip_is_shown_to_and_fro(count: int, length: int) -> None:
     images = [np.full((2, 2, 3), k, np.uint8) for k in range(count)]
-    shown = to_and_fro([Frame(k, 0.04 * k, image) for k, image in enumerate(images)], length)
+    shown = back_and_forth([Frame(k, 0.04 * k, image) for k, image in enumerate(images)], length)
     tones = [int(f.image[0, 0, 0]) for f in shown]
     assert len(shown) == length
     assert tones[:count] == list(range(count))[:length]

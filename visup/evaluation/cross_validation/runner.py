@@ -18,24 +18,28 @@ from visup.agent.model.errors import SettingsError, SourceError
 from visup.evaluation.families import family_of, mean_and_spread
 from visup.evaluation.figures import Progress, mean_of, silent
 from visup.evaluation.motion.code_digest import code_digest, files_digest
-from visup.evaluation.motion.folds import chosen, dealt, gains
+from visup.evaluation.motion.folds import assign_folds, gains, select_settings
 from visup.evaluation.motion.runner import LabelledSequence, find_sequences, score_sequence
 from visup.evaluation.motion.variants import PLAIN, VARIANTS
 from visup.evaluation.training.closed_loop import train
 from visup.evaluation.training.runner import (
     TrainingPlan,
-    found_below,
-    gathered,
-    known_or_error,
+    collect_examples,
+    require_ground_truth,
+    sequences_below,
 )
 from visup.evaluation.workers import each_in_processes
 from visup.percepts.motion.features.settings import MotionSettings
 from visup.percepts.motion.foreground.perceptron import write_model
 
-WEAK = 0.25  # J below which a sequence counts as lost
-UNSTABLE = 0.05  # difference of J between variants that counts as unstable
-KEPT = ("J", "F", "ghost")
-ROOMS = ("agent/model", "evaluation/motion", "percepts/motion", "percepts/video")
+WEAK_J = 0.25
+"""J below which a sequence counts as lost."""
+UNSTABLE_J = 0.05
+"""Difference of J between variants above which a sequence counts as unstable."""
+CACHED_KEYS = ("J", "F", "ghost")
+"""Figures that are stored in the cache."""
+CODE_FOLDERS = ("agent/model", "evaluation/motion", "percepts/motion", "percepts/video")
+"""Code on which results depend: when it changes, cached results are not used."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,77 +108,85 @@ def evaluate_folds(folder: Path, plan: FoldPlan, progress: Progress = silent) ->
         SettingsError: Nothing can be scored, or settings are unknown.
         SourceError: The figures to compare with cannot be read.
     """
-    before = _figures(plan.against) if plan.against else None
-    changes: list[dict[str, Any]] = [{}, *(tried_changes(text) for text in plan.tries)]
+    before = _read_j(plan.against) if plan.against else None
+    changes: list[dict[str, Any]] = [{}, *(parse_changes(text) for text in plan.tries)]
     sequences = {s.name: s for s in find_sequences(folder) if s.masks}
-    fold = dealt(sequences, plan.folds)
-    models = _learnt(sequences, fold, plan, progress) if plan.train else {}
-    ways = [(c, PLAIN) for c in changes]
-    ways += [(changes[0], v) for v in VARIANTS if plan.stability and v != PLAIN]
+    fold_of = assign_folds(sequences, plan.folds)
+    models = _train_by_fold(sequences, fold_of, plan, progress) if plan.train else {}
+    configurations = [(c, PLAIN) for c in changes]
+    configurations += [(changes[0], v) for v in VARIANTS if plan.stability and v != PLAIN]
     trials = {
-        (name, way): Trial(
+        (name, index): Trial(
             sequence,
-            replace(MotionSettings(foreground=models.get(fold[name])), **changed),
+            replace(MotionSettings(foreground=models.get(fold_of[name])), **change),
             variant,
             plan.limit,
             plan.cache,
         )
-        for way, (changed, variant) in enumerate(ways)
+        for index, (change, variant) in enumerate(configurations)
         for name, sequence in sequences.items()
     }
-    measured = dict(_measured(trials, plan.workers or os.cpu_count() or 1, progress))
-    names = [n for n in sequences if "J" in measured[n, 0]]
+    results = dict(_measure(trials, plan.workers or os.cpu_count() or 1, progress))
+    names = [name for name in sequences if "J" in results[name, 0]]
     if not names:
         raise SettingsError("no sequence has masks to be scored by", where=str(folder))
-    tried = [{n: measured[n, k]["J"] for n in names} for k in range(len(changes))]
-    choice = chosen(tried, {n: fold[n] for n in names})
-    items = {n: {**measured[n, choice[fold[n]]], "fold": fold[n]} for n in names}
+    scores_by_settings = [
+        {name: results[name, k]["J"] for name in names} for k in range(len(changes))
+    ]
+    choice = select_settings(scores_by_settings, {name: fold_of[name] for name in names})
+    items = {
+        name: {**results[name, choice[fold_of[name]]], "fold": fold_of[name]} for name in names
+    }
     if len(changes) > 1 or before is not None:
-        left_out = {n: item["J"] for n, item in items.items()}
-        for n, gain in gains(left_out, tried[0] if before is None else before).items():
-            items[n]["gain"] = gain
+        left_out = {name: item["J"] for name, item in items.items()}
+        for name, gain in gains(
+            left_out, scores_by_settings[0] if before is None else before
+        ).items():
+            items[name]["gain"] = gain
     if plan.stability:
-        variants = {v: k for k, (_, v) in enumerate(ways) if v != PLAIN}
-        for n in names:
-            seen = {v: measured[n, k]["J"] for v, k in variants.items() if "J" in measured[n, k]}
-            items[n] |= _moved(measured[n, 0]["J"], seen)
-    told = ["defaults", *plan.tries]
+        variants = {v: k for k, (_, v) in enumerate(configurations) if v != PLAIN}
+        for name in names:
+            j_by_variant = {
+                v: results[name, k]["J"] for v, k in variants.items() if "J" in results[name, k]
+            }
+            items[name] |= _instability(results[name, 0]["J"], j_by_variant)
+    setting_texts = ["defaults", *plan.tries]
     return {
         "total": _total(items),
         "items": items,
-        "choice": {str(f): told[k] for f, k in choice.items()},
+        "choice": {str(f): setting_texts[k] for f, k in choice.items()},
     }
 
 
-def _learnt(
+def _train_by_fold(
     sequences: Mapping[str, LabelledSequence],
-    fold: Mapping[str, int],
+    fold_of: Mapping[str, int],
     plan: FoldPlan,
     progress: Progress,
 ) -> dict[int, Path]:
     """The model files of the folds, each trained on all other folds and the additional sequences."""
-    how = TrainingPlan(plan.cache, plan.seed)
-    common = gathered(found_below(plan.also), how, progress)
-    found = gathered(sequences, how, progress)
-    out = {}
-    for number in sorted(set(fold.values())):
-        rest = {n: examples for n, examples in found.items() if fold[n] != number}
-        examples = known_or_error(common | rest)
+    training = TrainingPlan(plan.cache, plan.seed)
+    common = collect_examples(sequences_below(plan.also), training, progress)
+    examples_by_name = collect_examples(sequences, training, progress)
+    models = {}
+    for number in sorted(set(fold_of.values())):
+        others = {n: examples for n, examples in examples_by_name.items() if fold_of[n] != number}
+        examples = require_ground_truth(common | others)
         progress(f"fold {number} of {plan.folds}")
         model = train(examples, plan.seed, progress)
-        out[number] = plan.cache / f"fold-{number}-of-{plan.folds}-seed-{plan.seed}.json"
-        write_model(model, out[number], {"sequences": sorted(examples), "seed": plan.seed})
-    return out
+        models[number] = plan.cache / f"fold-{number}-of-{plan.folds}-seed-{plan.seed}.json"
+        write_model(model, models[number], {"sequences": sorted(examples), "seed": plan.seed})
+    return models
 
 
-def tried_changes(text: str) -> dict[str, Any]:
+def parse_changes(text: str) -> dict[str, Any]:
     """Parse settings such as 'confirm_s=0.3,evidence=0.8'.
 
     Raises:
         SettingsError: A setting is unknown or its value is no number.
     """
     known = {f.name: f.type for f in fields(MotionSettings) if f.type in ("bool", "int", "float")}
-    given: dict[str, Any] = {}
+    changes: dict[str, Any] = {}
     for part in text.split(","):
         name, _, value = (p.strip() for p in part.partition("="))
         if name not in known:
@@ -184,65 +196,69 @@ def tried_changes(text: str) -> dict[str, Any]:
                 expected=f"name=value with one of {', '.join(known)}",
             )
         try:
-            given[name] = float(value) if known[name] == "float" else int(value)
+            changes[name] = float(value) if known[name] == "float" else int(value)
         except ValueError:
             raise SettingsError(
                 f"{value!r} is not a value for {name}", where="--try", expected="a number"
             ) from None
-    return given
+    return changes
 
 
-def _figures(path: Path) -> dict[str, float]:
+def _read_j(path: Path) -> dict[str, float]:
     """J by sequence of an earlier evaluation."""
     try:
         items = json.loads(path.read_text(encoding="utf-8"))["items"]
         return {name: float(item["J"]) for name, item in items.items() if "J" in item}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as fault:
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise SourceError(
             "these figures cannot be read",
             where=str(path),
             expected="a file that 'visup eval motion --json' wrote",
-        ) from fault
+        ) from error
 
 
-def _moved(plain: float, seen: Mapping[str, float]) -> dict[str, Any]:
+def _instability(unchanged_j: float, j_by_variant: Mapping[str, float]) -> dict[str, Any]:
     """The greatest difference of J between a sequence and its variants, and which variant it is."""
-    if not seen:
+    if not j_by_variant:
         return {}
-    most = max(seen, key=lambda v: abs(seen[v] - plain))
-    return {"moved": abs(seen[most] - plain), "most": most, "variants": dict(seen)}
+    worst = max(j_by_variant, key=lambda v: abs(j_by_variant[v] - unchanged_j))
+    return {
+        "moved": abs(j_by_variant[worst] - unchanged_j),
+        "most": worst,
+        "variants": dict(j_by_variant),
+    }
 
 
 def _total(items: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     values = list(items.values())
-    out: dict[str, Any] = {k: mean_of(values, k) for k in KEPT}
-    out["spread"] = mean_and_spread({n: i["J"] for n, i in items.items()})[1]
-    out["sequences"] = len(items)
-    out["families"] = len({family_of(n) for n in items})
-    out["weak"] = sum(i["J"] < WEAK for i in values)
+    total: dict[str, Any] = {k: mean_of(values, k) for k in CACHED_KEYS}
+    total["spread"] = mean_and_spread({n: i["J"] for n, i in items.items()})[1]
+    total["sequences"] = len(items)
+    total["families"] = len({family_of(n) for n in items})
+    total["weak"] = sum(i["J"] < WEAK_J for i in values)
     if gained := {n: i["gain"] for n, i in items.items() if "gain" in i}:
-        out["gain"], out["gain_spread"] = mean_and_spread(gained)
+        total["gain"], total["gain_spread"] = mean_and_spread(gained)
     if moved := [i["moved"] for i in values if "moved" in i]:
-        out["moved"] = sum(moved) / len(moved)
-        out["unstable"] = sum(m > UNSTABLE for m in moved)
-    return out
+        total["moved"] = sum(moved) / len(moved)
+        total["unstable"] = sum(m > UNSTABLE_J for m in moved)
+    return total
 
 
-def _measured(
+def _measure(
     trials: Mapping[Any, Trial], workers: int, progress: Progress
 ) -> Iterator[tuple[Any, dict[str, Any]]]:
     """The results of trials by key, in order of completion."""
-    for count, (key, figures) in enumerate(_scored(trials, workers), 1):
+    for count, (key, figures) in enumerate(_score_all(trials, workers), 1):
         progress(f"{count} of {len(trials)}")
         yield key, figures
 
 
-def _scored(trials: Mapping[Any, Trial], workers: int) -> Iterator[tuple[Any, dict[str, Any]]]:
-    for (key, _), figures in each_in_processes(_score_of, tuple(trials.items()), workers):
+def _score_all(trials: Mapping[Any, Trial], workers: int) -> Iterator[tuple[Any, dict[str, Any]]]:
+    for (key, _), figures in each_in_processes(_score_item, tuple(trials.items()), workers):
         yield key, figures
 
 
-def _score_of(trial: tuple[Any, Trial]) -> dict[str, Any]:
+def _score_item(trial: tuple[Any, Trial]) -> dict[str, Any]:
     return _score(trial[1])
 
 
@@ -257,17 +273,17 @@ def _score(trial: Trial) -> dict[str, Any]:
         settings=trial.settings,
         variant=VARIANTS[trial.variant],
     )
-    kept = {k: figures[k] for k in KEPT if k in figures}
+    scores = {k: figures[k] for k in CACHED_KEYS if k in figures}
     trial.cache.mkdir(parents=True, exist_ok=True)
-    file.write_text(json.dumps(kept), encoding="utf-8")
-    return kept
+    file.write_text(json.dumps(scores), encoding="utf-8")
+    return scores
 
 
 def _digest(trial: Trial) -> str:
     """The cache key of a trial."""
-    digest = hashlib.sha256(code_digest(ROOMS))
-    says = (asdict(trial.settings), trial.variant, trial.limit, trial.sequence.name)
-    digest.update(json.dumps(says, default=str).encode())
+    digest = hashlib.sha256(code_digest(CODE_FOLDERS))
+    key = (asdict(trial.settings), trial.variant, trial.limit, trial.sequence.name)
+    digest.update(json.dumps(key, default=str).encode())
     if trial.settings.foreground is not None:
         digest.update(trial.settings.foreground.read_bytes())
     digest.update(files_digest(trial.sequence))

@@ -14,7 +14,7 @@ Image = NDArray[np.uint8]
 Random = np.random.Generator
 Injection = Callable[[Sequence[Frame], Random], list[Frame]]
 
-EXPECTED = {
+EXPECTED_STATUS = {
     "black": HealthStatus.DARK,
     "white": HealthStatus.SATURATED,
     "frozen": HealthStatus.FROZEN,
@@ -40,22 +40,24 @@ def inject(frames: Sequence[Frame], start: int, kind: str, seed: int) -> list[Fr
     Returns:
         The clip with the fault from `start` to its end; fewer frames when some were dropped.
     """
-    rng = np.random.default_rng([seed, sorted(EXPECTED).index(kind)])
+    rng = np.random.default_rng([seed, sorted(EXPECTED_STATUS).index(kind)])
     return [*frames[:start], *_INJECTIONS[kind](frames[start:], rng)]
 
 
-def _each(change: Callable[[Image], NDArray[np.generic]], frames: Sequence[Frame]) -> list[Frame]:
-    return [Frame(f.index, f.time, _bytes(change(f.image))) for f in frames]
+def _map_images(
+    change: Callable[[Image], NDArray[np.generic]], frames: Sequence[Frame]
+) -> list[Frame]:
+    return [Frame(f.index, f.time, _to_uint8(change(f.image))) for f in frames]
 
 
-def _bytes(values: NDArray[np.generic]) -> Image:
+def _to_uint8(values: NDArray[np.generic]) -> Image:
     return np.asarray(np.clip(np.rint(values), 0, 255), dtype=np.uint8)
 
 
-def _tone(frames: Sequence[Frame], rng: Random, level: float) -> list[Frame]:
+def _uniform(frames: Sequence[Frame], rng: Random, level: float) -> list[Frame]:
     """A uniform image, half of the time with sensor noise."""
     sigma = rng.uniform(0.5, 6.0) if rng.random() < 0.5 else 0.0
-    return _each(lambda image: level + _sensor_noise(image.shape, sigma, rng), frames)
+    return _map_images(lambda image: level + _sensor_noise(image.shape, sigma, rng), frames)
 
 
 def _sensor_noise(shape: tuple[int, ...], sigma: float, rng: Random) -> NDArray[np.float64]:
@@ -65,50 +67,50 @@ def _sensor_noise(shape: tuple[int, ...], sigma: float, rng: Random) -> NDArray[
 
 def black(frames: Sequence[Frame], rng: Random) -> list[Frame]:
     """Black or almost black, with or without noise."""
-    return _tone(frames, rng, float(rng.choice([0.0, rng.uniform(0, 12)])))
+    return _uniform(frames, rng, float(rng.choice([0.0, rng.uniform(0, 12)])))
 
 
 def white(frames: Sequence[Frame], rng: Random) -> list[Frame]:
     """White or almost white, with or without noise."""
-    return _tone(frames, rng, float(rng.choice([255.0, rng.uniform(238, 255)])))
+    return _uniform(frames, rng, float(rng.choice([255.0, rng.uniform(238, 255)])))
 
 
 def frozen(frames: Sequence[Frame], rng: Random) -> list[Frame]:
     """The same image repeated, sometimes with noise added afterwards."""
-    kept = frames[0].image.astype(np.float32)
+    image_ = frames[0].image.astype(np.float32)
     sigma = rng.uniform(0.2, 0.8) if rng.random() < 0.3 else 0.0
-    return _each(lambda image: kept + _sensor_noise(kept.shape, sigma, rng), frames)
+    return _map_images(lambda image: image_ + _sensor_noise(image_.shape, sigma, rng), frames)
 
 
 def noise(frames: Sequence[Frame], rng: Random) -> list[Frame]:
     """Gaussian noise or salt and pepper, coloured or grey."""
     sigma, density = rng.uniform(25.0, 80.0), rng.uniform(0.05, 0.4)
-    salted, grey = rng.random() < 0.4, rng.random() < 0.5
+    salt_and_pepper, grey = rng.random() < 0.4, rng.random() < 0.5
 
     def change(image: Image) -> NDArray[np.generic]:
         shape = (*image.shape[:2], 1) if grey else image.shape
-        if not salted:
+        if not salt_and_pepper:
             return image + rng.normal(0.0, sigma, shape)
-        hit = rng.random((*image.shape[:2], 1)) < density
-        return np.where(hit, 255.0 * (rng.random(shape) < 0.5), image)
+        replaced = rng.random((*image.shape[:2], 1)) < density
+        return np.where(replaced, 255.0 * (rng.random(shape) < 0.5), image)
 
-    return _each(change, frames)
+    return _map_images(change, frames)
 
 
 def blocked(frames: Sequence[Frame], rng: Random) -> list[Frame]:
     """Half of the view covered by a flat, noisy or textured surface."""
     height, width = frames[0].image.shape[:2]
-    covered = _half(height, width, rng)[..., None]
-    cover = _cover(height, width, rng)
+    covered = _half_mask(height, width, rng)[..., None]
+    cover = _cover_image(height, width, rng)
     sigma = rng.uniform(0.5, 2.0) if rng.random() < 0.3 else 0.0
 
     def change(image: Image) -> NDArray[np.generic]:
         return np.where(covered, cover + _sensor_noise(image.shape, sigma, rng), image)
 
-    return _each(change, frames)
+    return _map_images(change, frames)
 
 
-def _half(height: int, width: int, rng: Random) -> NDArray[np.bool_]:
+def _half_mask(height: int, width: int, rng: Random) -> NDArray[np.bool_]:
     """Left, right, top, bottom or a slanting half; about half of the area."""
     y, x = np.mgrid[:height, :width]
     across, down = (x + 0.5) / width - 0.5, (y + 0.5) / height - 0.5
@@ -119,43 +121,43 @@ def _half(height: int, width: int, rng: Random) -> NDArray[np.bool_]:
     return np.asarray(side < rng.uniform(-0.03, 0.1), dtype=bool)
 
 
-def _cover(height: int, width: int, rng: Random) -> NDArray[np.float32]:
+def _cover_image(height: int, width: int, rng: Random) -> NDArray[np.float32]:
     """(H, W, 3): black, grey, coloured, or textured as a cloth or a cap."""
-    which = rng.integers(4)
-    if which == 0:
+    variant = rng.integers(4)
+    if variant == 0:
         return np.zeros((height, width, 3), np.float32)
-    if which == 1:
+    if variant == 1:
         return np.full((height, width, 3), rng.uniform(30, 220), np.float32)
     colour = rng.uniform(10, 240, 3).astype(np.float32)
-    plain = np.broadcast_to(colour, (height, width, 3)).astype(np.float32)
-    if which == 2:
-        return plain
+    flat = np.broadcast_to(colour, (height, width, 3)).astype(np.float32)
+    if variant == 2:
+        return flat
     grain = rng.normal(0.0, 1.0, (height, width)).astype(np.float32)
-    weave = cv2.GaussianBlur(grain, (0, 0), float(rng.uniform(1.0, 6.0)))
-    strength = rng.uniform(5.0, 25.0) / max(float(weave.std()), 1e-6)
-    return plain * 0.5 + np.asarray(weave * strength, np.float32)[..., None]
+    texture = cv2.GaussianBlur(grain, (0, 0), float(rng.uniform(1.0, 6.0)))
+    strength = rng.uniform(5.0, 25.0) / max(float(texture.std()), 1e-6)
+    return flat * 0.5 + np.asarray(texture * strength, np.float32)[..., None]
 
 
 def scrambled(frames: Sequence[Frame], rng: Random) -> list[Frame]:
     """All or half of the blocks exchanged or shifted, differently in each frame or always the same."""
     size = int(rng.integers(8, 65))
     share = float(rng.choice([0.5, 1.0]))
-    shifted, anew = rng.random() < 0.4, rng.random() < 0.5
+    shifted, redrawn = rng.random() < 0.4, rng.random() < 0.5
     offset = rng.integers(0, size, 2)
     fixed = int(rng.integers(2**31))
 
     def change(image: Image) -> NDArray[np.generic]:
-        draw = rng if anew else np.random.default_rng(fixed)
+        draw = rng if redrawn else np.random.default_rng(fixed)
         y0, x0 = offset
         out = image.copy()
         rows = np.arange(y0, image.shape[0] - size + 1, size)
         columns = np.arange(x0, image.shape[1] - size + 1, size)
-        places = [(int(y), int(x)) for y in rows for x in columns]
-        chosen = draw.permutation(len(places))[: max(2, round(share * len(places)))]
+        blocks = [(int(y), int(x)) for y in rows for x in columns]
+        chosen = draw.permutation(len(blocks))[: max(2, round(share * len(blocks)))]
         sources = np.roll(chosen, 1)
         for to, source in zip(chosen, sources, strict=True):
-            y, x = places[to]
-            v, u = places[source]
+            y, x = blocks[to]
+            v, u = blocks[source]
             if shifted:
                 v = int(
                     np.clip(y + draw.integers(-2 * size, 2 * size + 1), 0, image.shape[0] - size)
@@ -166,24 +168,24 @@ def scrambled(frames: Sequence[Frame], rng: Random) -> list[Frame]:
             out[y : y + size, x : x + size] = image[v : v + size, u : u + size]
         return out
 
-    return _each(change, frames)
+    return _map_images(change, frames)
 
 
 def dropped(frames: Sequence[Frame], rng: Random) -> list[Frame]:
     """Missing frames: a gap, many gaps, or repeated frames in their place."""
     seconds = frames[1].time - frames[0].time
-    which = rng.integers(3)
-    if which == 0:
+    variant = rng.integers(3)
+    if variant == 0:
         missing = max(3, round(rng.uniform(0.2, 0.6) / seconds))
         return list(frames[missing:])
     keep = rng.random(len(frames)) > rng.uniform(0.4, 0.7)
-    if which == 1:
-        return [f for f, kept in zip(frames, keep, strict=True) if kept]
-    out, last = [], frames[0]
-    for frame, kept in zip(frames, keep, strict=True):
-        last = frame if kept else last
-        out.append(Frame(frame.index, frame.time, last.image))
-    return out
+    if variant == 1:
+        return [f for f, keep_frame in zip(frames, keep, strict=True) if keep_frame]
+    frames_out, last = [], frames[0]
+    for frame, keep_frame in zip(frames, keep, strict=True):
+        last = frame if keep_frame else last
+        frames_out.append(Frame(frame.index, frame.time, last.image))
+    return frames_out
 
 
 _INJECTIONS: dict[str, Injection] = {

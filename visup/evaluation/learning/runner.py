@@ -31,12 +31,12 @@ MISSIONS = ("pick", "charge", "fetch", "boats", "bench")
 """Kinds whose meetings are visible to a camera. In the others a parcel is hidden by its bin, a payload
 cannot be told from the hand that holds it, a crane is above its truck in the image from the start, an
 inspector meets nobody, and a walker is alone."""
-SEEDS_APART = 10_000
+SEED_STRIDE = 10_000
 """Offset between the seeds of two draws, so that their worlds differ."""
-MOST_DRAWN = 40
+MAX_DRAWS = 40
 """Most draws for each world wanted, until enough have the same actors."""
-NOT_OVER = "in_progress"
-KEYS = ("accepted", "good", "refused", "bad")
+IN_PROGRESS = "in_progress"
+COUNT_KEYS = ("accepted", "good", "refused", "bad")
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,14 +46,14 @@ class LearningTrial:
     Attributes:
         kind: Kind of world.
         seed: Seed of all draws.
-        taught: Good runs that the task is learned from.
-        others: Further good runs, and as many bad ones.
+        training_runs: Good runs that the task is learned from.
+        test_runs: Further good runs, and as many bad ones.
     """
 
     kind: str
     seed: int
-    taught: int
-    others: int
+    training_runs: int
+    test_runs: int
 
 
 def evaluate_learning(
@@ -90,46 +90,57 @@ def evaluate_learning(
         items[trial.kind] = figures
         progress(f"{trial.kind}: {figures['accepted']} of {figures['good']} accepted")
     ordered = {t.kind: items[t.kind] for t in trials}
-    held = sum(
+    passed = sum(
         f["accepted"] == f["good"] and f["refused"] >= 0.9 * f["bad"] for f in ordered.values()
     )
-    total = {**sums_of(list(ordered.values()), KEYS), "missions": len(ordered), "held": held}
+    total = {
+        **sums_of(list(ordered.values()), COUNT_KEYS),
+        "missions": len(ordered),
+        "held": passed,
+    }
     return {"total": total, "items": ordered}
 
 
 def evaluate_kind(trial: LearningTrial) -> dict[str, Any]:
     """Learn one task and judge further runs by it."""
-    good = worlds_of(trial.kind, trial.seed, ("ok",), trial.taught + trial.others)
+    good = worlds_of(trial.kind, trial.seed, ("ok",), trial.training_runs + trial.test_runs)
     actors = set(good[0].actors)
-    bad = worlds_of(trial.kind, trial.seed + 1, bad_outcomes(trial.kind), trial.others, actors)
-    taught, others = good[: trial.taught], good[trial.taught :]
-    figures: dict[str, Any] = {"good": len(others), "bad": len(bad), "accepted": 0, "refused": 0}
+    test_bad = worlds_of(
+        trial.kind, trial.seed + 1, bad_outcomes(trial.kind), trial.test_runs, actors
+    )
+    training, test_good = good[: trial.training_runs], good[trial.training_runs :]
+    figures: dict[str, Any] = {
+        "good": len(test_good),
+        "bad": len(test_bad),
+        "accepted": 0,
+        "refused": 0,
+    }
     try:
-        learned = learn_task("task", [trace_of(w.name, world_minds(w)) for w in taught])
-    except TaskError as fault:
-        return {**figures, "failed": str(fault), "wrong": []}
+        learned = learn_task("task", [trace_of(w.name, world_minds(w)) for w in training])
+    except TaskError as error:
+        return {**figures, "failed": str(error), "wrong": []}
     task = parse_task(learned.text)
     wrong = []
-    for world in (*others, *bad):
+    for world in (*test_good, *test_bad):
         success = judged(task, world_minds(world)).verdict is Verdict.SUCCEEDED
-        meant = world.truth.outcome == "ok"
-        figures["accepted" if meant else "refused"] += success == meant
-        wrong += [] if success == meant else [world.name]
-    actions, written = actions_of(task), actions_of(parse_task(taught[0].task_text))
-    unlike = {
+        should_succeed = world.truth.outcome == "ok"
+        figures["accepted" if should_succeed else "refused"] += success == should_succeed
+        wrong += [] if success == should_succeed else [world.name]
+    actions, written = actions_of(task), actions_of(parse_task(training[0].task_text))
+    differences = {
         "unlike": len(actions ^ written),
-        "unlike_in_meaning": len(beyond(actions, written) | beyond(written, actions)),
+        "unlike_in_meaning": len(not_implied(actions, written) | not_implied(written, actions)),
     }
-    return {**figures, **unlike, "task": learned.text, "wrong": wrong}
+    return {**figures, **differences, "task": learned.text, "wrong": wrong}
 
 
 def bad_outcomes(kind: str) -> tuple[str, ...]:
     """The outcomes with which a world of a kind fails."""
-    found = []
+    outcomes = []
     for outcome in KINDS[kind].outcomes[1:]:
         verdict = random_world(kind, 0, outcome).truth.verdict
-        found += [outcome] if verdict not in ("succeeded", NOT_OVER) else []
-    return tuple(found)
+        outcomes += [outcome] if verdict not in ("succeeded", IN_PROGRESS) else []
+    return tuple(outcomes)
 
 
 def worlds_of(
@@ -148,25 +159,27 @@ def worlds_of(
         count: How many.
         actors: Actors of the worlds.
     """
-    found: list[World] = []
-    wanted, vain = list(outcomes), 0
-    for number in range(MOST_DRAWN * count):
-        if vain == MOST_DRAWN and len(wanted) > 1:  # this outcome only comes with other actors
-            wanted.remove(wanted[len(found) % len(wanted)])
-            vain = 0
-        outcome = wanted[len(found) % len(wanted)]
-        world = random_world(kind, SEEDS_APART * seed + number, outcome)
+    worlds: list[World] = []
+    remaining, failed_draws = list(outcomes), 0
+    for number in range(MAX_DRAWS * count):
+        if (
+            failed_draws == MAX_DRAWS and len(remaining) > 1
+        ):  # this outcome only comes with other actors
+            remaining.remove(remaining[len(worlds) % len(remaining)])
+            failed_draws = 0
+        outcome = remaining[len(worlds) % len(remaining)]
+        world = random_world(kind, SEED_STRIDE * seed + number, outcome)
         actors = actors or set(world.actors)
-        vain += 1
+        failed_draws += 1
         if set(world.actors) == actors:
-            found.append(world)
-            vain = 0
-        if len(found) == count:
+            worlds.append(world)
+            failed_draws = 0
+        if len(worlds) == count:
             break
-    return found
+    return worlds
 
 
-def beyond(some: set[ActorsAction], others: set[ActorsAction]) -> set[ActorsAction]:
+def not_implied(actions: set[ActorsAction], others: set[ActorsAction]) -> set[ActorsAction]:
     """The actions that none of the others is or implies: who is coupled touches and moves together.
 
     >>> pair = frozenset({"gripper", "part"})
@@ -175,6 +188,6 @@ def beyond(some: set[ActorsAction], others: set[ActorsAction]) -> set[ActorsActi
     """
     return {
         (name, actors)
-        for name, actors in some
+        for name, actors in actions
         if not any((n, actors) in others for n in IMPLIED_BY.get(name, frozenset({name})))
     }

@@ -32,10 +32,10 @@ def world_minds(world: World) -> tuple[Mind, ...]:
     """The mental model of a world at each frame, without a task."""
     renderer = WorldRenderer(world)
     labels = {role: world.labels[name] for role, name in world.actors.items()}
-    eyes = [TrueCamera(renderer.camera), *role_behaviours(renderer.mask, labels, FPS)]
+    behaviours = [TrueCamera(renderer.camera), *role_behaviours(renderer.mask, labels, FPS)]
     width, height = world.size
     blank = np.zeros((height, width, 3), np.uint8)
-    agent = reasoning_agent(WatchSettings(source=world.name), (), eyes)
+    agent = reasoning_agent(WatchSettings(source=world.name), (), behaviours)
     try:
         return tuple(
             agent.step(Frame(index, index / FPS, blank)).mind for index in range(world.frames)
@@ -68,11 +68,11 @@ def affine_motion(
     camera: PlateCamera, before: int, now: int, size: tuple[int, int]
 ) -> NDArray[np.float64]:
     """(2, 3) least-squares affine approximation of the image motion between two frames, pixels."""
-    there, here = camera.to_plate(before), camera.to_plate(now)
-    if there is None or here is None:
+    previous, current = camera.to_plate(before), camera.to_plate(now)
+    if previous is None or current is None:
         return np.eye(2, 3)
     width, height = size
-    at = np.array([(x * width, y * height, 1.0) for x in (0, 0.5, 1) for y in (0, 0.5, 1)])
-    moved = at @ (np.linalg.inv(here) @ there).T
-    found, *_ = np.linalg.lstsq(at, moved[:, :2] / moved[:, 2:], rcond=None)
-    return np.asarray(found.T)
+    points = np.array([(x * width, y * height, 1.0) for x in (0, 0.5, 1) for y in (0, 0.5, 1)])
+    moved = points @ (np.linalg.inv(current) @ previous).T
+    solution, *_ = np.linalg.lstsq(points, moved[:, :2] / moved[:, 2:], rcond=None)
+    return np.asarray(solution.T)

@@ -10,12 +10,12 @@ from pathlib import Path
 from visup.evaluation.motion.runner import LabelledSequence
 
 
-def code_digest(rooms: Sequence[str]) -> bytes:
+def code_digest(folders: Sequence[str]) -> bytes:
     """A digest of files and folders of the package, with their code and data."""
     digest = hashlib.sha256()
     package = Path(str(resources.files("visup")))
-    for room in rooms:
-        for file in [package / room, *sorted((package / room).rglob("*"))]:
+    for folder in folders:
+        for file in [package / folder, *sorted((package / folder).rglob("*"))]:
             if file.is_file() and file.parent.name != "__pycache__":
                 digest.update(file.read_bytes())
     return digest.digest()

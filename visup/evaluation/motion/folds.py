@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from visup.evaluation.families import Scores, family_of
 
 
-def dealt(names: Iterable[str], folds: int) -> dict[str, int]:
+def assign_folds(names: Iterable[str], folds: int) -> dict[str, int]:
     """Assign whole families to folds, the largest first, each to the smallest fold so far.
 
     Args:
@@ -23,32 +23,34 @@ def dealt(names: Iterable[str], folds: int) -> dict[str, int]:
         Name -> number of its fold, from 0.
     """
     names = sorted(names)
-    sizes = Counter(family_of(n) for n in names)
-    filled = [0] * folds
-    fold: dict[str, int] = {}
-    for family in sorted(sizes, key=lambda f: (-sizes[f], f)):
-        fold[family] = min(range(folds), key=lambda i: (filled[i], i))
-        filled[fold[family]] += sizes[family]
-    return {n: fold[family_of(n)] for n in names}
+    family_sizes = Counter(family_of(n) for n in names)
+    fold_sizes = [0] * folds
+    fold_of_family: dict[str, int] = {}
+    for family in sorted(family_sizes, key=lambda f: (-family_sizes[f], f)):
+        fold_of_family[family] = min(range(folds), key=lambda i: (fold_sizes[i], i))
+        fold_sizes[fold_of_family[family]] += family_sizes[family]
+    return {n: fold_of_family[family_of(n)] for n in names}
 
 
-def chosen(tried: Sequence[Scores], fold: Mapping[str, int]) -> dict[int, int]:
+def select_settings(
+    scores_by_settings: Sequence[Scores], fold_of: Mapping[str, int]
+) -> dict[int, int]:
     """The settings with which each fold is scored: the best on all other folds.
 
     Args:
-        tried: Scores of every sequence for each of the settings; the first are the defaults.
-        fold: The fold of each sequence.
+        scores_by_settings: Scores of every sequence for each of the settings; the first are the defaults.
+        fold_of: The fold of each sequence.
 
     Returns:
         Number of a fold -> index of its settings; the earlier among equals, and the defaults without other
         folds.
     """
-    out = {}
-    for number in sorted(set(fold.values())):
-        rest = [n for n, f in fold.items() if f != number]
-        sums = [sum(scores[n] for n in rest) for scores in tried]
-        out[number] = sums.index(max(sums))
-    return out
+    choice = {}
+    for number in sorted(set(fold_of.values())):
+        others = [n for n, f in fold_of.items() if f != number]
+        sums = [sum(scores[n] for n in others) for scores in scores_by_settings]
+        choice[number] = sums.index(max(sums))
+    return choice
 
 
 def gains(scores: Scores, before: Scores) -> dict[str, float]:

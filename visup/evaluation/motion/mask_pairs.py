@@ -35,12 +35,12 @@ def mask_pairs(source: Path, masks: Sequence[Path]) -> dict[int, Path]:
         numbers.setdefault(last_number(frame), []).append(index)
     pairs: dict[int, Path] = {}
     for mask in masks:
-        of_number = numbers.get(last_number(mask), []) if frames else [last_number(mask)]
-        index = names.get(mask.stem, of_number[0] if len(of_number) == 1 else -1)
+        candidates = numbers.get(last_number(mask), []) if frames else [last_number(mask)]
+        index = names.get(mask.stem, candidates[0] if len(candidates) == 1 else -1)
         if index < 0 or index in pairs:
-            what = "a second truth of a frame" if index in pairs else "the truth of no frame"
+            problem = "a second truth of a frame" if index in pairs else "the truth of no frame"
             raise SettingsError(
-                f"this mask is {what}",
+                f"this mask is {problem}",
                 where=str(mask),
                 expected=f"a mask is named as its frame in {source.name}",
             )
@@ -50,5 +50,5 @@ def mask_pairs(source: Path, masks: Sequence[Path]) -> dict[int, Path]:
 
 def last_number(path: Path) -> int:
     """The last number in a file name; -1 without one."""
-    found = _NUMBER.search(path.stem)
-    return int(found[1]) if found else -1
+    match = _NUMBER.search(path.stem)
+    return int(match[1]) if match else -1

@@ -12,12 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 Mask = NDArray[np.bool_]
-UNSCORED = 128
-TOLERANCE = 0.008
-SMALLEST_SCORED_PX = 500
+UNSCORED_LABEL = 128
+"""Value of pixels in a mask that are not scored."""
+BOUNDARY_TOLERANCE = 0.008
+"""Tolerance of F, share of the image diagonal, as in DAVIS."""
+MIN_SCORED_PX = 500
+"""Objects with fewer visible pixels are not scored in a frame."""
 GHOST_OVERLAP = 0.1
 MATCH_IOU = 0.5
-START_S = 2.0
+UNSCORED_START_S = 2.0
+"""Time after an object's first scored frame in which it is not scored yet, seconds."""
 
 
 def iou(a: Mask, b: Mask) -> float:
@@ -26,12 +30,12 @@ def iou(a: Mask, b: Mask) -> float:
     return int(np.count_nonzero(a & b)) / union if union else 1.0
 
 
-def region_similarity(seen: Mask, true: Mask, scored: Mask) -> float | None:
+def region_similarity(predicted: Mask, ground_truth: Mask, scored: Mask) -> float | None:
     """J of one frame.
 
     Args:
-        seen: (H, W) bool, union of all regions.
-        true: (H, W) bool, union of all objects.
+        predicted: (H, W) bool, union of all regions.
+        ground_truth: (H, W) bool, union of all objects.
         scored: (H, W) bool, where pixels are scored.
 
     Returns:
@@ -39,23 +43,25 @@ def region_similarity(seen: Mask, true: Mask, scored: Mask) -> float | None:
     """
     if not scored.any():
         return None
-    return iou(seen & scored, true & scored)
+    return iou(predicted & scored, ground_truth & scored)
 
 
-def boundary_measure(seen: Mask, true: Mask, tolerance: float = TOLERANCE) -> float:
+def boundary_measure(
+    predicted: Mask, ground_truth: Mask, tolerance: float = BOUNDARY_TOLERANCE
+) -> float:
     """F of one frame: how well two outlines agree, as DAVIS defines it.
 
     Args:
-        seen: (H, W) bool.
-        true: (H, W) bool.
+        predicted: (H, W) bool.
+        ground_truth: (H, W) bool.
         tolerance: How far a boundary pixel may lie off, share of the image diagonal.
 
     Returns:
         0 to 1; 1 when both are empty.
     """
-    reach = math.ceil(tolerance * math.hypot(*seen.shape))
-    a, b = boundary(seen), boundary(true)
-    near_a, near_b = _grown(a, reach), _grown(b, reach)
+    tolerance_px = math.ceil(tolerance * math.hypot(*predicted.shape))
+    a, b = boundary(predicted), boundary(ground_truth)
+    near_a, near_b = _dilated(a, tolerance_px), _dilated(b, tolerance_px)
     count_a, count_b = int(a.sum()), int(b.sum())
     if count_a == 0 or count_b == 0:
         return float(count_a == count_b)
@@ -71,7 +77,7 @@ def boundary(mask: Mask) -> Mask:
     return np.asarray((here != inner[:-1, 1:]) | (here != inner[1:, :-1]) | (here != inner[1:, 1:]))
 
 
-def _grown(mask: Mask, radius: int) -> Mask:
+def _dilated(mask: Mask, radius: int) -> Mask:
     ys, xs = np.mgrid[-radius : radius + 1, -radius : radius + 1]
     disk = (xs * xs + ys * ys <= radius * radius).astype(np.uint8)
     return np.asarray(cv2.dilate(mask.astype(np.uint8), disk) > 0)
@@ -82,29 +88,29 @@ class PixelCounts:
     """Pixels over all frames of a sequence, as CDnet counts them (Goyette et al. 2012).
 
     Attributes:
-        right: True positives.
-        false: False positives.
-        missed: False negatives.
+        true_positives: True positives.
+        false_positives: False positives.
+        false_negatives: False negatives.
     """
 
-    right: int = 0
-    false: int = 0
-    missed: int = 0
+    true_positives: int = 0
+    false_positives: int = 0
+    false_negatives: int = 0
 
-    def with_frame(self, seen: Mask, true: Mask, scored: Mask) -> PixelCounts:
+    def with_frame(self, predicted: Mask, ground_truth: Mask, scored: Mask) -> PixelCounts:
         """Add the scored pixels of a frame."""
-        right = int(np.count_nonzero(seen & true & scored))
+        true_positives = int(np.count_nonzero(predicted & ground_truth & scored))
         return PixelCounts(
-            self.right + right,
-            self.false + int(np.count_nonzero(seen & scored)) - right,
-            self.missed + int(np.count_nonzero(true & scored)) - right,
+            self.true_positives + true_positives,
+            self.false_positives + int(np.count_nonzero(predicted & scored)) - true_positives,
+            self.false_negatives + int(np.count_nonzero(ground_truth & scored)) - true_positives,
         )
 
     @property
     def f_measure(self) -> float:
         """Harmonic mean of precision and recall, 0 to 1; 1 without truth and detections."""
-        pixels = 2 * self.right + self.false + self.missed
-        return 2 * self.right / pixels if pixels else 1.0
+        pixels = 2 * self.true_positives + self.false_positives + self.false_negatives
+        return 2 * self.true_positives / pixels if pixels else 1.0
 
 
 def has_ghost(regions: Iterable[Mask], objects: Sequence[Mask]) -> bool:
@@ -138,10 +144,14 @@ class MaskOverlaps:
     def iou(self, ids: Iterable[int], names: Iterable[str]) -> float:
         """IoU of the union of some regions with the union of some objects."""
         ids, names = set(ids), set(names)
-        both = sum(v for (i, n), v in self.common.items() if i in ids and n in names)
-        seen = sum(v for i, v in self.regions.items() if i in ids)
-        true = sum(v for n, v in self.objects.items() if n in names)
-        return both / (seen + true - both) if seen + true - both else 0.0
+        intersection = sum(v for (i, n), v in self.common.items() if i in ids and n in names)
+        region_px = sum(v for i, v in self.regions.items() if i in ids)
+        object_px = sum(v for n, v in self.objects.items() if n in names)
+        return (
+            intersection / (region_px + object_px - intersection)
+            if region_px + object_px - intersection
+            else 0.0
+        )
 
     def iou_by_region(self, name: str) -> dict[int, float]:
         """IoU of one object with each region."""
@@ -206,19 +216,19 @@ def object_scores(
         Scores by object, without those that are never scored.
     """
     names = sorted({n for f in frames for n in f.objects})
-    apart, joined = _periods(frames, names, coupled)
-    best = {n: best_region([f.iou_by_region(n) for f in apart[n]]) for n in names}
-    out = {}
+    single, coupled_frames = _periods(frames, names, coupled)
+    best = {n: best_region([f.iou_by_region(n) for f in single[n]]) for n in names}
+    scores = {}
     for name in names:
         own = [i for i in (best[name],) if i is not None]
-        values = [f.iou(own, (name,)) for f in apart[name]]
-        switches = id_switches(f.covering((name,)) for f in apart[name])
-        for group, together in joined[name].items():
-            values += _together(together, group, {best[n] for n in group} - {None})
-            switches += id_switches(f.covering(group) for f in together)
+        values = [f.iou(own, (name,)) for f in single[name]]
+        switches = id_switches(f.covering((name,)) for f in single[name])
+        for group, group_frames in coupled_frames[name].items():
+            values += _group_ious(group_frames, group, {best[n] for n in group} - {None})
+            switches += id_switches(f.covering(group) for f in group_frames)
         if values:
-            out[name] = ObjectScore(sum(values) / len(values), switches)
-    return out
+            scores[name] = ObjectScore(sum(values) / len(values), switches)
+    return scores
 
 
 def _periods(
@@ -227,31 +237,31 @@ def _periods(
     coupled: Sequence[tuple[int, frozenset[str]]],
 ) -> tuple[dict[str, list[MaskOverlaps]], dict[str, dict[frozenset[str], list[MaskOverlaps]]]]:
     """Scored frames of each object: by itself, and coupled."""
-    apart: dict[str, list[MaskOverlaps]] = {n: [] for n in names}
-    joined: dict[str, dict[frozenset[str], list[MaskOverlaps]]] = {n: {} for n in names}
+    single: dict[str, list[MaskOverlaps]] = {n: [] for n in names}
+    coupled_frames: dict[str, dict[frozenset[str], list[MaskOverlaps]]] = {n: {} for n in names}
     entered: dict[str, float] = {}
     for frame in frames:
         for name in names:
-            if frame.objects.get(name, 0) < SMALLEST_SCORED_PX:
+            if frame.objects.get(name, 0) < MIN_SCORED_PX:
                 continue
-            if frame.time < entered.setdefault(name, frame.time) + START_S:
+            if frame.time < entered.setdefault(name, frame.time) + UNSCORED_START_S:
                 continue
-            groups = [g for at, g in coupled if name in g and frame.index >= at]
+            groups = [g for start, g in coupled if name in g and frame.index >= start]
             if groups:
-                joined[name].setdefault(groups[-1], []).append(frame)
+                coupled_frames[name].setdefault(groups[-1], []).append(frame)
             else:
-                apart[name].append(frame)
-    return apart, joined
+                single[name].append(frame)
+    return single, coupled_frames
 
 
-def _together(
+def _group_ious(
     frames: Sequence[MaskOverlaps], group: frozenset[str], own: set[int | None]
 ) -> list[float]:
     ids = [i for i in own if i is not None]
-    theirs = [f.iou(ids, group) for f in frames]
+    former = [f.iou(ids, group) for f in frames]
     single = best_region([{i: f.iou((i,), group) for i in f.regions} for f in frames])
-    one = [f.iou((single,), group) if single else 0.0 for f in frames]
-    return max(theirs, one, key=sum)
+    best_single = [f.iou((single,), group) if single else 0.0 for f in frames]
+    return max(former, best_single, key=sum)
 
 
 def best_region(overlaps: Sequence[Mapping[int, float]]) -> int | None:
@@ -280,5 +290,5 @@ def id_switches(ids: Iterable[int | None]) -> int:
     Returns:
         The number of changes between frames with a region, ignoring gaps.
     """
-    known = [i for i in ids if i is not None]
-    return sum(a != b for a, b in itertools.pairwise(known))
+    present = [i for i in ids if i is not None]
+    return sum(a != b for a, b in itertools.pairwise(present))

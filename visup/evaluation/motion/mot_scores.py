@@ -29,22 +29,22 @@ def read_truth(path: Path) -> dict[int, dict[int, Box]]:
     Raises:
         SourceError: A line is malformed.
     """
-    out: dict[int, dict[int, Box]] = {}
+    truth: dict[int, dict[int, Box]] = {}
     for number, line in enumerate(path.read_text().splitlines(), 1):
         if not line.strip():
             continue
         try:
             values = [float(v) for v in line.split(",")]
             x, y, w, h = values[2:6]
-        except ValueError as e:
+        except ValueError as error:
             raise SourceError(
                 "this is not a line of a MOT ground truth",
                 where=f"{path}:{number}",
                 expected="frame, id, x, y, width, height, ...",
-            ) from e
+            ) from error
         if len(values) < 7 or values[6] != 0:
-            out.setdefault(int(values[0]) - 1, {})[int(values[1])] = (x, y, w, h)
-    return out
+            truth.setdefault(int(values[0]) - 1, {})[int(values[1])] = (x, y, w, h)
+    return truth
 
 
 def truth_of_images(
@@ -64,35 +64,35 @@ def truth_of_images(
         numbers
     ):  # names without usable numbers: by order
         numbers = list(range(len(images)))
-    places = {number: place for place, number in enumerate(numbers)}
+    index_of = {number: index for index, number in enumerate(numbers)}
     for frame in truth:
-        if frame not in places:
+        if frame not in index_of:
             raise SourceError(
                 f"there is no image of frame {frame + 1}, of which the truth tells",
                 where=str(images[0].parent) if images else "",
                 expected="an image with the number of each frame, from 1, in its name",
             )
-    return {places[frame]: boxes for frame, boxes in truth.items()}
+    return {index_of[frame]: boxes for frame, boxes in truth.items()}
 
 
-def box_distance(true: Sequence[Box], seen: Sequence[Box]) -> NDArray[np.float64]:
+def box_distance(ground_truth: Sequence[Box], predicted: Sequence[Box]) -> NDArray[np.float64]:
     """1 - IoU of boxes (x, y, w, h), (len(true), len(seen)); nan where IoU is below 0.5."""
-    a = np.asarray(true, dtype=np.float64).reshape(-1, 1, 4)
-    b = np.asarray(seen, dtype=np.float64).reshape(1, -1, 4)
-    low = np.maximum(a[..., :2], b[..., :2])
-    high = np.minimum(a[..., :2] + a[..., 2:], b[..., :2] + b[..., 2:])
-    common = np.prod(np.clip(high - low, 0, None), axis=-1)
-    union = np.prod(a[..., 2:], axis=-1) + np.prod(b[..., 2:], axis=-1) - common
-    share = common / np.maximum(union, 1e-9)
-    return np.where(share >= 0.5, 1 - share, np.nan)
+    a = np.asarray(ground_truth, dtype=np.float64).reshape(-1, 1, 4)
+    b = np.asarray(predicted, dtype=np.float64).reshape(1, -1, 4)
+    top_left = np.maximum(a[..., :2], b[..., :2])
+    bottom_right = np.minimum(a[..., :2] + a[..., 2:], b[..., :2] + b[..., 2:])
+    intersection = np.prod(np.clip(bottom_right - top_left, 0, None), axis=-1)
+    union = np.prod(a[..., 2:], axis=-1) + np.prod(b[..., 2:], axis=-1) - intersection
+    iou = intersection / np.maximum(union, 1e-9)
+    return np.where(iou >= 0.5, 1 - iou, np.nan)
 
 
-def mot_scores(true: Mapping[int, Boxes], seen: Mapping[int, Boxes]) -> dict[str, Any]:
+def mot_scores(ground_truth: Mapping[int, Boxes], predicted: Mapping[int, Boxes]) -> dict[str, Any]:
     """MOTA and IDF1 at IoU 0.5.
 
     Args:
-        true: Frame -> id -> box.
-        seen: Frame -> region id -> box; its frames are scored.
+        ground_truth: Frame -> id -> box.
+        predicted: Frame -> region id -> box; its frames are scored.
 
     Returns:
         `mota`, `idf1` and `id_switches`.
@@ -102,18 +102,18 @@ def mot_scores(true: Mapping[int, Boxes], seen: Mapping[int, Boxes]) -> dict[str
     """
     try:
         import motmetrics
-    except ImportError as e:
-        raise ExtraMissingError("scoring MOT folders", "eval") from e
+    except ImportError as error:
+        raise ExtraMissingError("scoring MOT folders", "eval") from error
     # The library's own use of NumPy and pandas causes warnings.
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        tally = motmetrics.MOTAccumulator(auto_id=True)
-        for frame in sorted(seen):
-            objects, regions = true.get(frame, {}), seen[frame]
+        accumulator = motmetrics.MOTAccumulator(auto_id=True)
+        for frame in sorted(predicted):
+            objects, regions = ground_truth.get(frame, {}), predicted[frame]
             distance = box_distance(list(objects.values()), list(regions.values()))
-            tally.update(list(objects), list(regions), distance)
+            accumulator.update(list(objects), list(regions), distance)
         table = motmetrics.metrics.create().compute(
-            tally, metrics=["mota", "idf1", "num_switches"], name="all"
+            accumulator, metrics=["mota", "idf1", "num_switches"], name="all"
         )
     row = table.loc["all"]
     return {

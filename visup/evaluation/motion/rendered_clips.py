@@ -21,7 +21,7 @@ from visup.evaluation.figures import Progress, silent
 from visup.evaluation.workers import each_in_processes
 from visup.render.scenario.library import bench_names, shipped_scenario
 
-MARK = "made-of.txt"
+DIGEST_FILE = "made-of.txt"
 """File of a cached clip with the digest of its scenario and renderer."""
 
 
@@ -68,13 +68,13 @@ def evaluate_clips(
         SettingsError: There is no clip of a name.
         OutputError: The cache cannot be written.
     """
-    wanted = _known(names)
-    found: dict[str, dict[str, Any]] = {}
+    chosen = _known_names(names)
+    scores: dict[str, dict[str, Any]] = {}
     score = partial(_score, cache=cache)
-    for name, figures in each_in_processes(score, wanted, workers or os.cpu_count() or 1):
-        found[name] = figures
-        progress(f"{len(found)} of {len(wanted)} clips")
-    items = {name: judged(found[name], bar_of(name)) for name in wanted}
+    for name, clip_scores in each_in_processes(score, chosen, workers or os.cpu_count() or 1):
+        scores[name] = clip_scores
+        progress(f"{len(scores)} of {len(chosen)} clips")
+    items = {name: compare_with_bar(scores[name], bar_of(name)) for name in chosen}
     return {"total": _total(items), "items": items}
 
 
@@ -83,7 +83,7 @@ def bar_of(name: str) -> Bar:
     return BARS.get(name, Bar())
 
 
-def judged(figures: Mapping[str, Any], bar: Bar) -> dict[str, Any]:
+def compare_with_bar(figures: Mapping[str, Any], bar: Bar) -> dict[str, Any]:
     """Compare the figures of a clip with its bar.
 
     Args:
@@ -110,7 +110,7 @@ def judged(figures: Mapping[str, Any], bar: Bar) -> dict[str, Any]:
     return {**figures, "bar": asdict(bar), "missed": missed}
 
 
-def rendered(name: str, cache: Path) -> Path:
+def rendered_clip(name: str, cache: Path) -> Path:
     """The folder of a clip, rendered if missing or outdated.
 
     Args:
@@ -125,16 +125,16 @@ def rendered(name: str, cache: Path) -> Path:
     """
     from visup.render.output.writer import write_mission
 
-    folder, recipe = cache / name, _recipe(name)
-    mark = folder / MARK
-    if mark.is_file() and mark.read_text(encoding="utf-8") == recipe:
+    folder, digest = cache / name, _render_digest(name)
+    digest_file = folder / DIGEST_FILE
+    if digest_file.is_file() and digest_file.read_text(encoding="utf-8") == digest:
         return folder
     try:
         if folder.exists():
             shutil.rmtree(folder)
         write_mission(shipped_scenario(f"bench/{name}"), folder)
         # Last, so that a clip whose rendering was interrupted has no mark.
-        mark.write_text(recipe, encoding="utf-8")
+        digest_file.write_text(digest, encoding="utf-8")
     except OSError as error:
         raise OutputError(
             f"the clip cannot be kept: {error.strerror}", where=str(folder)
@@ -142,13 +142,13 @@ def rendered(name: str, cache: Path) -> Path:
     return folder
 
 
-def _recipe(name: str) -> str:
+def _render_digest(name: str) -> str:
     """The digest of a scenario and of all rendering code."""
     digest = hashlib.sha256()
     package = resources.files("visup.render")
-    rooms = (package / room for room in ("imaging", "meshes", "scenario"))
-    beside = [f for room in rooms for f in room.iterdir() if f.name.endswith(".py")]
-    code = sorted(beside, key=str)
+    folders = (package / folder for folder in ("imaging", "meshes", "scenario"))
+    code_files = [f for folder in folders for f in folder.iterdir() if f.name.endswith(".py")]
+    code = sorted(code_files, key=str)
     for file in (*code, package / "scenarios" / "bench" / f"{name}.toml"):
         digest.update(file.read_bytes())
     return digest.hexdigest() + "\n"
@@ -158,11 +158,11 @@ def _score(name: str, cache: Path) -> dict[str, Any]:
     """The figures of one clip."""
     from visup.evaluation.motion.runner import evaluate_motion
 
-    items: dict[str, dict[str, Any]] = evaluate_motion(rendered(name, cache))["items"]
+    items: dict[str, dict[str, Any]] = evaluate_motion(rendered_clip(name, cache))["items"]
     return items[name]
 
 
-def _known(names: Sequence[str]) -> tuple[str, ...]:
+def _known_names(names: Sequence[str]) -> tuple[str, ...]:
     known = bench_names()
     for name in names:
         if name not in known:
@@ -172,11 +172,11 @@ def _known(names: Sequence[str]) -> tuple[str, ...]:
 
 def _total(items: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     values = list(items.values())
-    out: dict[str, Any] = {}
+    total: dict[str, Any] = {}
     for key in ("J", "F", "J_object", "ghost"):
         numbers = [v[key] for v in values if key in v]
-        out[key] = sum(numbers) / len(numbers) if numbers else None
-    out["id_switches"] = sum(v.get("id_switches", 0) for v in values)
-    out["passed"] = sum(not v["missed"] for v in values)
-    out["clips"] = len(values)
-    return out
+        total[key] = sum(numbers) / len(numbers) if numbers else None
+    total["id_switches"] = sum(v.get("id_switches", 0) for v in values)
+    total["passed"] = sum(not v["missed"] for v in values)
+    total["clips"] = len(values)
+    return total

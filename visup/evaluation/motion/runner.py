@@ -22,7 +22,7 @@ from visup.agent.model.errors import SettingsError, SourceError
 from visup.evaluation.figures import Progress, silent
 from visup.evaluation.motion.mask_pairs import mask_pairs
 from visup.evaluation.motion.mask_scores import (
-    UNSCORED,
+    UNSCORED_LABEL,
     MaskOverlaps,
     PixelCounts,
     boundary_measure,
@@ -32,14 +32,25 @@ from visup.evaluation.motion.mask_scores import (
     region_similarity,
 )
 from visup.evaluation.motion.mot_scores import Box, mot_scores, read_truth, truth_of_images
-from visup.evaluation.motion.variants import AS_IT_IS, Variant
+from visup.evaluation.motion.variants import UNCHANGED, Variant
 from visup.percepts.motion.features.settings import MotionSettings
 from visup.percepts.motion.segmenter import MotionSegmenter
 from visup.percepts.opencv_names import opencv_name
 from visup.percepts.video import open_source
 from visup.percepts.video.image_folder import images_in
 
-KEYS = ("J", "F", "f_measure", "J_object", "ghost", "id_switches", "mota", "idf1", "ms", "ratio")
+TOTAL_KEYS = (
+    "J",
+    "F",
+    "f_measure",
+    "J_object",
+    "ghost",
+    "id_switches",
+    "mota",
+    "idf1",
+    "ms",
+    "ratio",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +125,7 @@ def score_sequence(
     every: int = 1,
     limit: int | None = None,
     settings: MotionSettings | None = None,
-    variant: Variant = AS_IT_IS,
+    variant: Variant = UNCHANGED,
 ) -> dict[str, Any]:
     """The figures of one sequence.
 
@@ -131,7 +142,7 @@ def score_sequence(
     if limit is not None:
         limit = max(1, limit // variant.every)
     frames = _frames(sequence, every * variant.every, limit)
-    return _scores(sequence, _run(sequence, frames, MotionSegmenter(settings), variant))
+    return _scores(sequence, _segment(sequence, frames, MotionSegmenter(settings), variant))
 
 
 def find_sequences(folder: Path) -> list[LabelledSequence]:
@@ -142,26 +153,26 @@ def find_sequences(folder: Path) -> list[LabelledSequence]:
     """
     if not folder.is_dir():
         raise SettingsError("there is no such folder", where=str(folder))
-    places = [folder, *sorted(p for p in folder.rglob("*") if p.is_dir())]
-    out = []
-    for place in places:
-        name = place.name if place == folder else str(place.relative_to(folder))
-        masks = tuple(sorted((place / "masks").glob("*.png")))
-        if (place / "frames").is_dir() and masks:
-            source = place / "frames"
-            out.append(LabelledSequence(name, source, mask_pairs(source, masks)))
-        elif (place / "video.mp4").is_file() and masks and (place / "truth.json").is_file():
-            truth, source = place / "truth.json", place / "video.mp4"
-            out.append(LabelledSequence(name, source, mask_pairs(source, masks), truth))
-        elif (place / "img1").is_dir() and (place / "gt" / "gt.txt").is_file():
-            out.append(LabelledSequence(name, place, boxes=place / "gt" / "gt.txt"))
-    if not out:
+    folders = [folder, *sorted(p for p in folder.rglob("*") if p.is_dir())]
+    sequences = []
+    for subfolder in folders:
+        name = subfolder.name if subfolder == folder else str(subfolder.relative_to(folder))
+        masks = tuple(sorted((subfolder / "masks").glob("*.png")))
+        if (subfolder / "frames").is_dir() and masks:
+            source = subfolder / "frames"
+            sequences.append(LabelledSequence(name, source, mask_pairs(source, masks)))
+        elif (subfolder / "video.mp4").is_file() and masks and (subfolder / "truth.json").is_file():
+            truth, source = subfolder / "truth.json", subfolder / "video.mp4"
+            sequences.append(LabelledSequence(name, source, mask_pairs(source, masks), truth))
+        elif (subfolder / "img1").is_dir() and (subfolder / "gt" / "gt.txt").is_file():
+            sequences.append(LabelledSequence(name, subfolder, boxes=subfolder / "gt" / "gt.txt"))
+    if not sequences:
         raise SettingsError(
             "nothing to score was found",
             where=str(folder),
             expected="folders with frames and masks, missions, or MOT folders",
         )
-    return out
+    return sequences
 
 
 def labelled_frames(
@@ -178,42 +189,42 @@ def labelled_frames(
     for frame, _ in _frames(sequence, variant.every, limit):
         mask = sequence.masks.get(frame.index)
         yield (
-            variant.shown(frame),
+            variant.apply(frame),
             None if mask is None else variant.labels(_labels(mask, frame.size)),
         )
 
 
-def _run(
+def _segment(
     sequence: LabelledSequence,
     frames: Iterable[tuple[Frame, bool]],
     segmenter: MotionSegmenter,
     variant: Variant,
 ) -> SequenceMeasurements:
     """Segment one sequence and collect the measurements."""
-    tally = SequenceMeasurements()
-    names = _truth(sequence).get("labels", {})
-    dis = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
-    before: NDArray[np.uint8] | None = None
-    for number, (taken, last) in enumerate(frames):
-        frame = variant.shown(taken)
+    measurements = SequenceMeasurements()
+    names = _read_mission_truth(sequence).get("labels", {})
+    optical_flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
+    previous: NDArray[np.uint8] | None = None
+    for number, (original, last) in enumerate(frames):
+        frame = variant.apply(original)
         start = time.perf_counter()
         regions = segmenter.step(frame)
-        tally.ms.append(1e3 * (time.perf_counter() - start))
+        measurements.ms.append(1e3 * (time.perf_counter() - start))
         grey = np.asarray(cv2.cvtColor(frame.image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
-        if before is not None:
+        if previous is not None:
             start = time.perf_counter()
-            dis.calc(before, grey, None)  # type: ignore[call-overload]
-            tally.dis_ms.append(1e3 * (time.perf_counter() - start))
-        before = grey
-        tally.boxes[frame.index] = {r.id: _box(r) for r in regions}
+            optical_flow.calc(previous, grey, None)  # type: ignore[call-overload]
+            measurements.dis_ms.append(1e3 * (time.perf_counter() - start))
+        previous = grey
+        measurements.boxes[frame.index] = {r.id: _box(r) for r in regions}
         if frame.index in sequence.masks:
-            labels = variant.labels(_labels(sequence.masks[frame.index], taken.size))
+            labels = variant.labels(_labels(sequence.masks[frame.index], original.size))
             masks = {r.id: r.full_mask(frame.size) for r in regions}
-            _tally_masks(tally, labels, masks, inner=number > 0 and not last)
+            _measure_masks(measurements, labels, masks, inner=number > 0 and not last)
             if names:
-                seen = overlaps_of(frame.index, frame.time, labels, names, masks)
-                tally.overlaps.append(seen)
-    return tally
+                overlaps = overlaps_of(frame.index, frame.time, labels, names, masks)
+                measurements.overlaps.append(overlaps)
+    return measurements
 
 
 def _frames(
@@ -221,15 +232,15 @@ def _frames(
 ) -> Iterator[tuple[Frame, bool]]:
     """Frames with a flag for the last."""
     with open_source(str(sequence.source), every=every) as source:
-        waiting: Frame | None = None
+        pending: Frame | None = None
         for count, frame in enumerate(source):
             if limit is not None and count >= limit:
                 break
-            if waiting is not None:
-                yield waiting, False
-            waiting = frame
-        if waiting is not None:
-            yield waiting, True
+            if pending is not None:
+                yield pending, False
+            pending = frame
+        if pending is not None:
+            yield pending, True
 
 
 def _labels(path: Path, size: tuple[int, int]) -> NDArray[np.uint8]:
@@ -252,67 +263,69 @@ def _box(region: Region) -> Box:
     return float(x), float(y), float(w), float(h)
 
 
-def _tally_masks(
-    tally: SequenceMeasurements,
+def _measure_masks(
+    measurements: SequenceMeasurements,
     labels: NDArray[np.uint8],
     masks: Mapping[int, NDArray[np.bool_]],
     *,
     inner: bool,
 ) -> None:
     """Add pixel counts and ghosts of a frame, and J and F unless it is the first or last."""
-    scored = labels != UNSCORED
-    true = (labels > 0) & scored
-    seen = np.zeros(labels.shape, dtype=bool)
+    scored = labels != UNSCORED_LABEL
+    ground_truth = (labels > 0) & scored
+    predicted = np.zeros(labels.shape, dtype=bool)
     for mask in masks.values():
-        seen |= mask
-    j = region_similarity(seen, true, scored)
+        predicted |= mask
+    j = region_similarity(predicted, ground_truth, scored)
     if j is None:
         return
-    tally.pixels = tally.pixels.with_frame(seen, true, scored)
+    measurements.pixels = measurements.pixels.with_frame(predicted, ground_truth, scored)
     if inner:
-        tally.j.append(j)
-        tally.f.append(boundary_measure(seen & scored, true))
+        measurements.j.append(j)
+        measurements.f.append(boundary_measure(predicted & scored, ground_truth))
     values = [v for v in np.unique(labels).tolist() if v != 0]
     # Unscored pixels may be objects: a region there is no ghost.
-    tally.ghosts.append(has_ghost(masks.values(), [labels == v for v in values]))
+    measurements.ghosts.append(has_ghost(masks.values(), [labels == v for v in values]))
 
 
-def _truth(sequence: LabelledSequence) -> dict[str, Any]:
+def _read_mission_truth(sequence: LabelledSequence) -> dict[str, Any]:
     return dict(json.loads(sequence.truth.read_text())) if sequence.truth else {}
 
 
-def _scores(sequence: LabelledSequence, tally: SequenceMeasurements) -> dict[str, Any]:
+def _scores(sequence: LabelledSequence, measurements: SequenceMeasurements) -> dict[str, Any]:
     """The figures of one sequence."""
-    out: dict[str, Any] = {}
-    if tally.j:
-        out |= {"J": statistics.fmean(tally.j), "F": statistics.fmean(tally.f)}
-        out["f_measure"] = tally.pixels.f_measure
-    if tally.ghosts:
-        out["ghost"] = statistics.fmean(tally.ghosts)
+    scores: dict[str, Any] = {}
+    if measurements.j:
+        scores |= {"J": statistics.fmean(measurements.j), "F": statistics.fmean(measurements.f)}
+        scores["f_measure"] = measurements.pixels.f_measure
+    if measurements.ghosts:
+        scores["ghost"] = statistics.fmean(measurements.ghosts)
     if sequence.truth is not None:
-        events = _truth(sequence).get("events", ())
+        events = _read_mission_truth(sequence).get("events", ())
         coupled = [
             (int(e["frame"]), frozenset(e["objects"])) for e in events if e["kind"] == "coupled"
         ]
-        objects = object_scores(tally.overlaps, coupled)
+        objects = object_scores(measurements.overlaps, coupled)
         if objects:
-            out["J_object"] = statistics.fmean(s.j for s in objects.values())
-            out["id_switches"] = sum(s.switches for s in objects.values())
-            out["objects"] = {n: {"J": s.j, "id_switches": s.switches} for n, s in objects.items()}
+            scores["J_object"] = statistics.fmean(s.j for s in objects.values())
+            scores["id_switches"] = sum(s.switches for s in objects.values())
+            scores["objects"] = {
+                n: {"J": s.j, "id_switches": s.switches} for n, s in objects.items()
+            }
     if sequence.boxes is not None:
         truth = truth_of_images(read_truth(sequence.boxes), images_in(sequence.source / "img1"))
-        out |= mot_scores(truth, tally.boxes)
-    out["ms"] = statistics.median(tally.ms)
-    if tally.dis_ms:
-        out["ratio"] = out["ms"] / statistics.median(tally.dis_ms)
-    return out
+        scores |= mot_scores(truth, measurements.boxes)
+    scores["ms"] = statistics.median(measurements.ms)
+    if measurements.dis_ms:
+        scores["ratio"] = scores["ms"] / statistics.median(measurements.dis_ms)
+    return scores
 
 
 def _total(items: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Means over the sequences with a figure; id switches are summed."""
-    out: dict[str, Any] = {}
-    for key in KEYS:
+    total: dict[str, Any] = {}
+    for key in TOTAL_KEYS:
         values = [item[key] for item in items if key in item]
         if values:
-            out[key] = sum(values) if key == "id_switches" else statistics.fmean(values)
-    return out
+            total[key] = sum(values) if key == "id_switches" else statistics.fmean(values)
+    return total

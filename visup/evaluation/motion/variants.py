@@ -13,8 +13,8 @@ from visup.agent import Frame
 
 Image = NDArray[np.uint8]
 
-SMALLER = 0.75  # scale of the smaller image
-QUALITY = 50  # JPEG: with visible blocks, but recognisable objects
+SMALLER_SCALE = 0.75  # scale of the smaller image
+JPEG_QUALITY = 50  # JPEG: with visible blocks, but recognisable objects
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,7 @@ class Variant:
     labels: Callable[[Image], Image] = lambda labels: labels
     every: int = 1
 
-    def shown(self, frame: Frame) -> Frame:
+    def apply(self, frame: Frame) -> Frame:
         """The transformed frame."""
         return replace(frame, image=self.image(frame.image))
 
@@ -40,24 +40,24 @@ def _mirrored(image: Image) -> Image:
     return np.ascontiguousarray(image[:, ::-1])
 
 
-def _smaller(how: int) -> Callable[[Image], Image]:
+def _smaller(interpolation: int) -> Callable[[Image], Image]:
     def resized(image: Image) -> Image:
         height, width = image.shape[:2]
-        size = (max(1, round(width * SMALLER)), max(1, round(height * SMALLER)))
-        return np.asarray(cv2.resize(image, size, interpolation=how), dtype=np.uint8)
+        size = (max(1, round(width * SMALLER_SCALE)), max(1, round(height * SMALLER_SCALE)))
+        return np.asarray(cv2.resize(image, size, interpolation=interpolation), dtype=np.uint8)
 
     return resized
 
 
 def _compressed(image: Image) -> Image:
-    _, data = cv2.imencode(".jpg", image, (cv2.IMWRITE_JPEG_QUALITY, QUALITY))
+    _, data = cv2.imencode(".jpg", image, (cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY))
     return np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR), dtype=np.uint8)
 
 
 PLAIN = "plain"
-AS_IT_IS = Variant()
+UNCHANGED = Variant()
 VARIANTS: Mapping[str, Variant] = {
-    PLAIN: AS_IT_IS,
+    PLAIN: UNCHANGED,
     "mirrored": Variant(_mirrored, _mirrored),
     "half the frames": Variant(every=2),
     "smaller": Variant(_smaller(cv2.INTER_AREA), _smaller(cv2.INTER_NEAREST)),

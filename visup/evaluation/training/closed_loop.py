@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from visup.evaluation.figures import Progress, silent
-from visup.evaluation.motion.folds import dealt
+from visup.evaluation.motion.folds import assign_folds
 from visup.evaluation.training.examples import Example
-from visup.evaluation.training.fitting import Rows, fit_ensemble
+from visup.evaluation.training.fitting import TrainingRows, fit_ensemble
 from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.foreground.belief import (
     ALONE_NEAR,
@@ -28,14 +28,17 @@ from visup.percepts.motion.foreground.perceptron import ForegroundModel, Percept
 Sequences = Mapping[str, Sequence[Example]]
 FOLDS = 3
 ROUNDS = 2
-MOST = 4000  # training superpixels per sequence
-RARE = 0.03  # share of moving superpixels below which their weight is not increased further
-GAIN = 0.35  # exponent of its share by which it does: at 0.5 the best J was had by believing 0.6
-WHOLE = 0.7  # share of a superpixel that must have ground truth
+MAX_SUPERPIXELS = 4000  # training superpixels per sequence
+MIN_MOVING_SHARE = 0.03
+"""Share of moving superpixels below which their weight is not increased further."""
+BALANCE_EXPONENT = 0.35
+"""Moving superpixels are weighted by their share to the power of minus this. With 0.5 probabilities were too
+high: J was best when only those above 0.6 counted as moving."""
+MIN_LABELLED_SHARE = 0.7  # share of a superpixel that must have ground truth
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Judged:
+class TrainingCues:
     """Training cues of all frames of a sequence, (count, D) each."""
 
     cues: Sequence[Floats]
@@ -51,76 +54,89 @@ def train(sequences: Sequences, seed: int, progress: Progress = silent) -> Foreg
         progress: Shows what is being done.
     """
     names = sorted(sequences)
-    fold = dealt(names, FOLDS)
-    plain = {n: Judged([e.cues.values for e in sequences[n]], sequences[n]) for n in names}
+    fold_of = assign_folds(names, FOLDS)
+    cues_by_name = {
+        n: TrainingCues([e.cues.values for e in sequences[n]], sequences[n]) for n in names
+    }
     progress("cues alone")
-    alone = fit_ensemble(_rows(plain, names, seed), seed)
-    others = _crossed(plain, fold, seed)
-    contexts = {
-        n: _contexts(
-            sequences[n], others[fold[n]], lambda c: 0.6 * c[:, ALONE_NEAR] + 0.4 * c[:, PAST]
+    single_frame = fit_ensemble(_rows(cues_by_name, names, seed), seed)
+    cue_models = _fit_by_fold(cues_by_name, fold_of, seed)
+    contexts_by_name = {
+        n: _with_context(
+            sequences[n],
+            cue_models[fold_of[n]],
+            lambda c: 0.6 * c[:, ALONE_NEAR] + 0.4 * c[:, PAST],
         )
         for n in names
     }
     for number in range(ROUNDS):
         progress(f"context, round {number + 1} of {ROUNDS}")
-        judges = _crossed(contexts, fold, seed)
-        contexts = {
-            n: _contexts(sequences[n], others[fold[n]], judges[fold[n]].log_odds) for n in names
+        context_models = _fit_by_fold(contexts_by_name, fold_of, seed)
+        contexts_by_name = {
+            n: _with_context(
+                sequences[n], cue_models[fold_of[n]], context_models[fold_of[n]].log_odds
+            )
+            for n in names
         }
     progress("context")
-    return ForegroundModel(alone, fit_ensemble(_rows(contexts, names, seed), seed))
+    return ForegroundModel(single_frame, fit_ensemble(_rows(contexts_by_name, names, seed), seed))
 
 
-def _crossed(
-    judged: Mapping[str, Judged], fold: Mapping[str, int], seed: int
+def _fit_by_fold(
+    cues_by_name: Mapping[str, TrainingCues], fold_of: Mapping[str, int], seed: int
 ) -> dict[int, Perceptron]:
     """For each fold a perceptron fitted to all other folds, or to all if there are no others."""
-    out = {}
-    for number in sorted(set(fold.values())):
-        rest = [n for n in judged if fold[n] != number] or list(judged)
-        out[number] = fit_ensemble(_rows(judged, rest, seed), seed)
-    return out
+    models = {}
+    for number in sorted(set(fold_of.values())):
+        others = [name for name in cues_by_name if fold_of[name] != number] or list(cues_by_name)
+        models[number] = fit_ensemble(_rows(cues_by_name, others, seed), seed)
+    return models
 
 
-def _contexts(
-    examples: Sequence[Example], alone: Perceptron, judge: Callable[[Floats], Floats]
-) -> Judged:
+def _with_context(
+    examples: Sequence[Example], cue_model: Perceptron, context_log_odds: Callable[[Floats], Floats]
+) -> TrainingCues:
     """The context cues of a sequence with beliefs by a classifier."""
-    belief, out = initial_belief(), []
-    for e in examples:
-        odds = alone.log_odds(e.cues.values)
-        context = context_cues(belief, e.cues, odds)
-        belief = belief_from_log_odds(belief, e.cues, odds, judge(context))
-        out.append(context)
-    return Judged(out, examples)
+    belief, contexts = initial_belief(), []
+    for example in examples:
+        cue_log_odds = cue_model.log_odds(example.cues.values)
+        context = context_cues(belief, example.cues, cue_log_odds)
+        belief = belief_from_log_odds(belief, example.cues, cue_log_odds, context_log_odds(context))
+        contexts.append(context)
+    return TrainingCues(contexts, examples)
 
 
-def _rows(judged: Mapping[str, Judged], names: Sequence[str], seed: int) -> Rows:
+def _rows(
+    cues_by_name: Mapping[str, TrainingCues], names: Sequence[str], seed: int
+) -> TrainingRows:
     """Superpixels sampled from sequences.
 
     All sequences have equal weight; moving superpixels, which determine J and are rare, have more than their
     share.
     """
     rng = np.random.default_rng(seed)
-    parts = [p for p in (_drawn(judged[n], rng) for n in names) if p is not None]
-    return Rows(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+    parts = [p for p in (_sample_superpixels(cues_by_name[n], rng) for n in names) if p is not None]
+    return TrainingRows(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
-def _drawn(judged: Judged, rng: np.random.Generator) -> tuple[Floats, Floats, Floats] | None:
-    known = [
+def _sample_superpixels(
+    sequence: TrainingCues, rng: np.random.Generator
+) -> tuple[Floats, Floats, Floats] | None:
+    labelled = [
         (c, e.truth, e.scored, e.cues.area)
-        for c, e in zip(judged.cues, judged.examples, strict=True)
+        for c, e in zip(sequence.cues, sequence.examples, strict=True)
         if e.truth is not None
     ]
-    if not known:
+    if not labelled:
         return None
-    cues, truth, scored, area = (np.concatenate(column) for column in zip(*known, strict=True))
-    use = np.flatnonzero(scored > WHOLE)
-    if len(use) > MOST:
-        use = rng.choice(use, MOST, replace=False)
-    moves = truth[use] > 0.5
-    weight = area[use] / area[use].sum()
-    weight = weight * np.where(moves, max(float(weight[moves].sum()), RARE) ** -GAIN, 1.0)
+    cues, truth, scored, area = (np.concatenate(column) for column in zip(*labelled, strict=True))
+    chosen = np.flatnonzero(scored > MIN_LABELLED_SHARE)
+    if len(chosen) > MAX_SUPERPIXELS:
+        chosen = rng.choice(chosen, MAX_SUPERPIXELS, replace=False)
+    moving = truth[chosen] > 0.5
+    weight = area[chosen] / area[chosen].sum()
+    weight = weight * np.where(
+        moving, max(float(weight[moving].sum()), MIN_MOVING_SHARE) ** -BALANCE_EXPONENT, 1.0
+    )
     weight = np.asarray(weight / weight.sum(), dtype=np.float32)
-    return cues[use], moves.astype(np.float32), weight
+    return cues[chosen], moving.astype(np.float32), weight

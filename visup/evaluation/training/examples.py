@@ -13,18 +13,18 @@ from numpy.typing import NDArray
 
 from visup.agent import Frame
 from visup.evaluation.motion.code_digest import code_digest, files_digest
-from visup.evaluation.motion.mask_scores import UNSCORED
+from visup.evaluation.motion.mask_scores import UNSCORED_LABEL
 from visup.evaluation.motion.runner import LabelledSequence, labelled_frames
-from visup.evaluation.motion.variants import AS_IT_IS
+from visup.evaluation.motion.variants import UNCHANGED
 from visup.percepts.motion.features.work_image import Floats
 from visup.percepts.motion.foreground.belief import CUES_IN_CONTEXT
 from visup.percepts.motion.foreground.cues import NAMES, FrameCues
 from visup.percepts.motion.foreground.perceptron import blank_model
 from visup.percepts.motion.segmenter import MotionSegmenter
 
-SEEING = ("features", "layers", "tracks", "foreground/cues.py", "foreground/_cues_jit.py")
-CODE = tuple(f"percepts/motion/{part}" for part in SEEING)
-SCORED = 0.1  # share of a frame that must have ground truth
+CUE_CODE = ("features", "layers", "tracks", "foreground/cues.py", "foreground/_cues_jit.py")
+CODE_FILES = tuple(f"percepts/motion/{part}" for part in CUE_CODE)
+MIN_LABELLED_SHARE = 0.1  # share of a frame that must have ground truth
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,7 +42,7 @@ class Example:
     scored: Floats
 
 
-def collected(sequence: LabelledSequence, limit: int | None, cache: Path) -> list[Example]:
+def load_examples(sequence: LabelledSequence, limit: int | None, cache: Path) -> list[Example]:
     """The examples of one sequence, from the cache if available.
 
     Args:
@@ -50,24 +50,24 @@ def collected(sequence: LabelledSequence, limit: int | None, cache: Path) -> lis
         limit: Maximum frames, or None.
         cache: Folder, created if missing.
     """
-    digest = hashlib.sha256(code_digest(CODE))
+    digest = hashlib.sha256(code_digest(CODE_FILES))
     digest.update(json.dumps((sequence.name, limit)).encode())
     digest.update(files_digest(sequence))
     file = cache / f"{digest.hexdigest()}.npz"
-    return _kept(file, lambda: labelled_frames(sequence, AS_IT_IS, limit))
+    return _from_cache(file, lambda: labelled_frames(sequence, UNCHANGED, limit))
 
 
 Footage = Iterable[tuple[Frame, NDArray[np.uint8] | None]]
 
 
-def _kept(file: Path, footage: Callable[[], Footage]) -> list[Example]:
+def _from_cache(file: Path, footage: Callable[[], Footage]) -> list[Example]:
     if not file.is_file():
         file.parent.mkdir(parents=True, exist_ok=True)
-        _write(file, list(_collect(footage())))
+        _write(file, list(_extract_examples(footage())))
     return _read(file)
 
 
-def _collect(footage: Footage) -> Iterator[Example]:
+def _extract_examples(footage: Footage) -> Iterator[Example]:
     """The examples of a video during segmentation."""
     # Cues do not depend on the model.
     segmenter = MotionSegmenter(model=blank_model(len(NAMES), CUES_IN_CONTEXT))
@@ -83,45 +83,49 @@ def _cell_truth(
     labels: NDArray[np.uint8] | None, cells: NDArray[np.int32], count: int
 ) -> tuple[Floats | None, Floats]:
     """Moving share and scored share of each cell, (count,) each; the former is None without ground truth."""
-    none = np.zeros(count, np.float32)
-    if labels is None or np.mean(labels != UNSCORED) < SCORED:
-        return None, none
+    unlabelled = np.zeros(count, np.float32)
+    if labels is None or np.mean(labels != UNSCORED_LABEL) < MIN_LABELLED_SHARE:
+        return None, unlabelled
     height, width = cells.shape
     rows = (np.arange(height) + 0.5) * labels.shape[0] / height
     columns = (np.arange(width) + 0.5) * labels.shape[1] / width
-    small = labels[rows.astype(np.int64)[:, None], columns.astype(np.int64)]
-    at = cells.ravel()
-    pixels = np.maximum(np.bincount(at, minlength=count), 1)
-    scored = np.bincount(at, (small != UNSCORED).ravel(), count)
-    moving = np.bincount(at, ((small > 0) & (small != UNSCORED)).ravel(), count)
+    cell_labels = labels[rows.astype(np.int64)[:, None], columns.astype(np.int64)]
+    cell_of_pixel = cells.ravel()
+    pixels = np.maximum(np.bincount(cell_of_pixel, minlength=count), 1)
+    scored = np.bincount(cell_of_pixel, (cell_labels != UNSCORED_LABEL).ravel(), count)
+    moving = np.bincount(
+        cell_of_pixel, ((cell_labels > 0) & (cell_labels != UNSCORED_LABEL)).ravel(), count
+    )
     return (moving / np.maximum(scored, 1)).astype(np.float32), (scored / pixels).astype(np.float32)
 
 
-_PARTS = tuple(f.name for f in fields(FrameCues))
-_SHORT = ("here", "there", "neighbours", "part")
+_CUE_FIELDS = tuple(f.name for f in fields(FrameCues))
+_INDEX_FIELDS = ("here", "there", "neighbours", "part")
 
 
 def _write(file: Path, examples: Sequence[Example]) -> None:
     arrays: dict[str, NDArray[np.generic]] = {}
-    for n, e in enumerate(examples):
-        for part in _PARTS:
-            value = getattr(e.cues, part)
-            arrays[f"{n} {part}"] = value.astype(np.uint16) if part in _SHORT else value
-        arrays[f"{n} scored"] = e.scored
-        if e.truth is not None:
-            arrays[f"{n} truth"] = e.truth
-    part_file = file.with_suffix(".part.npz")
-    np.savez(part_file, allow_pickle=False, **arrays)
-    part_file.replace(file)
+    for number, example in enumerate(examples):
+        for part in _CUE_FIELDS:
+            value = getattr(example.cues, part)
+            arrays[f"{number} {part}"] = value.astype(np.uint16) if part in _INDEX_FIELDS else value
+        arrays[f"{number} scored"] = example.scored
+        if example.truth is not None:
+            arrays[f"{number} truth"] = example.truth
+    unfinished = file.with_suffix(".part.npz")
+    np.savez(unfinished, allow_pickle=False, **arrays)
+    unfinished.replace(file)
 
 
 def _read(file: Path) -> list[Example]:
     with np.load(file) as arrays:
-        found = dict(arrays)
-    count = sum(name.endswith(" scored") for name in found)
-    out = []
-    for n in range(count):
-        parts = {part: found[f"{n} {part}"] for part in _PARTS}
-        cues = FrameCues(**{k: v.astype(np.int32) if k in _SHORT else v for k, v in parts.items()})
-        out.append(Example(cues, found.get(f"{n} truth"), found[f"{n} scored"]))
-    return out
+        stored = dict(arrays)
+    count = sum(name.endswith(" scored") for name in stored)
+    examples = []
+    for number in range(count):
+        values = {part: stored[f"{number} {part}"] for part in _CUE_FIELDS}
+        cues = FrameCues(
+            **{k: v.astype(np.int32) if k in _INDEX_FIELDS else v for k, v in values.items()}
+        )
+        examples.append(Example(cues, stored.get(f"{number} truth"), stored[f"{number} scored"]))
+    return examples

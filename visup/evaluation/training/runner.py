@@ -10,10 +10,10 @@ from visup.agent.model.errors import OutputError, SettingsError
 from visup.evaluation.figures import Progress, silent
 from visup.evaluation.motion.runner import LabelledSequence, find_sequences
 from visup.evaluation.training.closed_loop import train
-from visup.evaluation.training.examples import Example, collected
+from visup.evaluation.training.examples import Example, load_examples
 from visup.percepts.motion.foreground.perceptron import write_model
 
-LIMIT = 250  # training frames per sequence
+MAX_FRAMES = 250  # training frames per sequence
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,7 @@ class TrainingPlan:
 
     cache: Path
     seed: int = 0
-    limit: int = LIMIT
+    limit: int = MAX_FRAMES
 
 
 def train_motion(
@@ -46,16 +46,16 @@ def train_motion(
         SettingsError: There are no training data.
         OutputError: The file cannot be written.
     """
-    examples = known_or_error(gathered(found_below(folders), plan, progress))
-    made = {"sequences": sorted(examples), "seed": plan.seed, "limit": plan.limit}
+    examples = require_ground_truth(collect_examples(sequences_below(folders), plan, progress))
+    provenance = {"sequences": sorted(examples), "seed": plan.seed, "limit": plan.limit}
     model = train(examples, plan.seed, progress)
     try:
-        write_model(model, out, made)
-    except OSError as fault:
-        raise OutputError(f"cannot write: {fault.strerror}", where=str(out)) from fault
+        write_model(model, out, provenance)
+    except OSError as error:
+        raise OutputError(f"cannot write: {error.strerror}", where=str(out)) from error
 
 
-def found_below(folders: Sequence[Path]) -> dict[str, LabelledSequence]:
+def sequences_below(folders: Sequence[Path]) -> dict[str, LabelledSequence]:
     """Sequences with masks below folders, by the names of folder and sequence.
 
     Raises:
@@ -69,18 +69,18 @@ def found_below(folders: Sequence[Path]) -> dict[str, LabelledSequence]:
     }
 
 
-def gathered(
+def collect_examples(
     sequences: Mapping[str, LabelledSequence], plan: TrainingPlan, progress: Progress = silent
 ) -> dict[str, Sequence[Example]]:
     """The examples of sequences by name."""
-    out: dict[str, Sequence[Example]] = {}
+    examples: dict[str, Sequence[Example]] = {}
     for name, sequence in sequences.items():
         progress(name)
-        out[name] = collected(sequence, plan.limit, plan.cache)
-    return out
+        examples[name] = load_examples(sequence, plan.limit, plan.cache)
+    return examples
 
 
-def known_or_error(
+def require_ground_truth(
     examples: Mapping[str, Sequence[Example]],
 ) -> dict[str, Sequence[Example]]:
     """The sequences with ground truth.
@@ -88,9 +88,11 @@ def known_or_error(
     Raises:
         SettingsError: There are none.
     """
-    known = {n: found for n, found in examples.items() if any(e.truth is not None for e in found)}
-    if not known:
+    labelled = {
+        n: frames for n, frames in examples.items() if any(e.truth is not None for e in frames)
+    }
+    if not labelled:
         raise SettingsError(
             "there is nothing to learn from", expected="sequences of two frames or more with masks"
         )
-    return known
+    return labelled
