@@ -50,7 +50,7 @@ def narrate_clip(folder: Path) -> NarratedRun:
     brief = read_brief(folder)
     with tempfile.TemporaryDirectory() as scratch:
         models = Path(scratch) / "taught.models"
-        store(models, views_of(brief.shown))
+        store(models, views_of(brief.outlines))
         settings = replace(clip_settings(brief), models=models)
         agent = build_agent(settings)
         try:

@@ -14,7 +14,7 @@ from visup.agent import Directive, Mind, Observation, Outcome
 from visup.agent.cycle.agent import Agent, Reasoners
 from visup.agent.model.step import Step
 from visup.evaluation.runtime.scripted_observations import moving_ellipses
-from visup.evaluation.runtime.stepping import whole
+from visup.evaluation.runtime.stepping import canonical_mind
 from visup.rules.language.parser import parse_rules, shipped_rules
 from visup.runs.settings import WatchSettings
 from visup.runs.wiring import reasoning_agent
@@ -75,7 +75,7 @@ def suspicious_agent() -> Agent:
 def told(step: Step | None) -> bytes:
     """All that a step came to, as bytes."""
     assert step is not None
-    return flat((whole(step.mind), step.events, step.alerts, step.directives))
+    return flat((canonical_mind(step.mind), step.events, step.alerts, step.directives))
 
 
 PLAIN = (str, int, float, bool, type(None))

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from visup.agent.model.errors import SettingsError
 from visup.cli import app
-from visup.evaluation.machines.random_worlds import RandomTrial, planned
+from visup.evaluation.machines.random_worlds import RandomTrial, plan_trials
 from visup.render.worlds.kinds.catalogue import KINDS
 
 LIKE = RandomTrial("", 0)
@@ -19,20 +19,20 @@ LIKE = RandomTrial("", 0)
 
 @pytest.mark.parametrize("count", [1, 7, 60])
 def test_kinds_are_spread_evenly(count: int) -> None:
-    counts = Counter(t.kind for t in planned((), count, 3, LIKE))
+    counts = Counter(t.kind for t in plan_trials((), count, 3, LIKE))
     assert sum(counts.values()) == count
     assert max(counts.values()) - min(counts[k] for k in KINDS) <= 1
 
 
 def test_no_two_evaluations_share_a_world() -> None:
-    first, second = ({(t.kind, t.seed) for t in planned((), 60, seed, LIKE)} for seed in (0, 1))
+    first, second = ({(t.kind, t.seed) for t in plan_trials((), 60, seed, LIKE)} for seed in (0, 1))
     assert len(first) == len(second) == 60
     assert not first & second
 
 
 def test_an_unknown_kind_is_refused() -> None:
     with pytest.raises(SettingsError, match="knitting"):
-        planned(("pick", "knitting"), 2, 0, LIKE)
+        plan_trials(("pick", "knitting"), 2, 0, LIKE)
 
 
 def test_the_command_reports_by_kind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -56,8 +56,8 @@ def shifted(report: MachineReport, by: float) -> MachineReport:
     return replace(
         report,
         stages=tuple(replace(s, time=s.time + by) for s in report.stages),
-        contacts=tuple(Interval(i.who, i.from_s + by, i.to_s + by) for i in report.contacts),
-        moves=tuple(Interval(i.who, i.from_s + by, i.to_s + by) for i in report.moves),
+        contacts=tuple(Interval(i.names, i.from_s + by, i.to_s + by) for i in report.contacts),
+        moves=tuple(Interval(i.names, i.from_s + by, i.to_s + by) for i in report.moves),
     )
 
 

@@ -7,8 +7,8 @@ from visup.evaluation.machines import teaching_cost
 
 
 def test_a_short_run_measures_steps_and_teaching(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(teaching_cost, "WARM", 10)
-    monkeypatch.setattr(teaching_cost, "NOISES", 6)
+    monkeypatch.setattr(teaching_cost, "WARM_UP_FRAMES", 10)
+    monkeypatch.setattr(teaching_cost, "NOISE_IMAGES", 6)
     total = teaching_cost.evaluate_teaching(20)["total"]
     assert total["ms"] > 0.0
     assert total["ms_taught"] < 3.0 * total["ms"]
@@ -18,4 +18,4 @@ def test_a_short_run_measures_steps_and_teaching(monkeypatch: pytest.MonkeyPatch
 
 def test_too_few_frames_are_refused() -> None:
     with pytest.raises(SettingsError, match="too few"):
-        teaching_cost.evaluate_teaching(2 * teaching_cost.WARM - 1)
+        teaching_cost.evaluate_teaching(2 * teaching_cost.WARM_UP_FRAMES - 1)

@@ -30,7 +30,7 @@ def test_growth_is_relative_to_one_mover(monkeypatch: pytest.MonkeyPatch) -> Non
     cost = {number: 10.0 + number for number in crowds.MOVER_COUNTS}
     monkeypatch.setattr(crowds, "crowd", lambda movers, frames, seed: movers)
     monkeypatch.setattr(
-        crowds, "_timed", lambda frames: {"ms": cost[frames], "ratio": cost[frames]}
+        crowds, "_frame_costs", lambda frames: {"ms": cost[frames], "ratio": cost[frames]}
     )
     figures = crowds.evaluate_crowds(20)
     assert figures["items"]["1"]["growth"] == 1

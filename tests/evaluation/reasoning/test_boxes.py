@@ -122,7 +122,7 @@ def test_mirrored_time_swaps_converging_and_diverging(speed: float, name: str) -
 def test_relations_do_not_depend_on_place_and_come_as_converses(seed: int, shift: float) -> None:
     frames = moving_boxes(3, 55, seed)
     here, there = watched(frames), watched(frames + np.array((shift, -shift, 0.0, 0.0)))
-    assert np.array_equal(here.latch.state, there.latch.state)
+    assert np.array_equal(here.hysteresis.state, there.hysteresis.state)
     turned = watched(frames[:, ::-1])
     for a, b in ((0, 1), (0, 2), (1, 2)):
         assert here.rcc8_of(a, b) == turned.rcc8_of(2 - a, 2 - b)
@@ -213,7 +213,7 @@ def test_gaps_are_the_distances_of_boxes_and_the_depth_of_their_overlap() -> Non
 
 
 def test_states_are_rows_of_codes_that_the_calculi_have() -> None:
-    state = watched(moving_boxes(8, 80, 4)).latch.state
+    state = watched(moving_boxes(8, 80, 4)).hysteresis.state
     assert set(np.unique(state[AWAY])) | set(np.unique(state[SIDE])) <= {0, 1, 2}
     assert state[DIRECTION].max() <= 8
     assert state[DISTANCE].max() <= 3

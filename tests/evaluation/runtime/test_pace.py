@@ -10,8 +10,8 @@ from visup.rules.language.parser import parse_rules, shipped_rules
 def test_a_short_run_measures_steps_replay_observers_and_minds(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(pace, "LEAST_STEPS", 60)
-    monkeypatch.setattr(pace, "WARM", 30)
+    monkeypatch.setattr(pace, "MIN_STEPS", 60)
+    monkeypatch.setattr(pace, "WARM_UP_STEPS", 30)
     figures = pace.evaluate_pace(60, kept=40)
     three, ten = (figures["items"][f"{n} objects"] for n in pace.COUNTS)
     assert 0.0 < three["ms_low"] <= three["ms"] < ten["ms"]

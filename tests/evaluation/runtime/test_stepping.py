@@ -5,24 +5,24 @@ from __future__ import annotations
 import pytest
 
 from visup.agent.model.errors import SettingsError
-from visup.evaluation.runtime.stepping import evaluate_stepping, missed
+from visup.evaluation.runtime.stepping import evaluate_stepping, missed_bars
 
 
 def test_a_short_course_has_all_figures_and_misses_no_bar(monkeypatch: pytest.MonkeyPatch) -> None:
-    small = {"LEAST_STEPS": 150, "BACK": 60, "BLOCK": 10, "BLOCKS": 2, "VISITS": 4}
+    small = {"MIN_STEPS": 150, "BACK_STEPS": 60, "BLOCK": 10, "BLOCKS": 2, "VISITS": 4}
     for name, value in small.items():
         monkeypatch.setattr(f"visup.evaluation.runtime.stepping.{name}", value)
     figures = evaluate_stepping(200)
     assert set(figures["items"]) == {"back", "look", "branch"}
     assert figures["total"]["same"] == 1.0
-    assert missed({**figures, "total": {**figures["total"], "kept_mb": 1.0}}) == []
+    assert missed_bars({**figures, "total": {**figures["total"], "kept_mb": 1.0}}) == []
     with pytest.raises(SettingsError, match="--steps is 10"):
         evaluate_stepping(10)
 
 
 def test_what_misses_a_bar_is_told() -> None:
     items = {"back": {"median_ms": 90.0, "most_ms": 250.0}}
-    told = missed({"items": items, "total": {"kept_mb": 300.0, "same": 0.5}})
+    told = missed_bars({"items": items, "total": {"kept_mb": 300.0, "same": 0.5}})
     assert [t.split(" the bar")[0] for t in told] == [
         "back(500) took 250 ms,",
         "10000 steps keep 300 MB,",

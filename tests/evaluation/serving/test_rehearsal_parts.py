@@ -15,12 +15,12 @@ from visup.agent import Alert, Mind, Observation, Severity
 from visup.agent.model.errors import SettingsError
 from visup.agent.model.step import Step
 from visup.agent.storage.journal import Journal
-from visup.evaluation.serving.account import Ledger
-from visup.evaluation.serving.night import Kill, Killer, Timetable
+from visup.evaluation.serving.alert_audit import AlertAuditor
+from visup.evaluation.serving.fault_injection import Kill, ProcessKiller, Timetable
 from visup.evaluation.serving.receiver import AlertReceiver
 from visup.evaluation.serving.rehearsal import evaluate_serving, failed, prepare_store
 from visup.evaluation.serving.scene import CROSSING, SIZE, jpegs, scene
-from visup.evaluation.serving.streams import TroubledStream
+from visup.evaluation.serving.streams import FaultyStream
 from visup.percepts.video import open_source
 
 
@@ -28,7 +28,7 @@ def test_a_stream_is_a_camera_that_is_watched_live() -> None:
     frames = scene(1)
     assert (frames[CROSSING // 2] != frames[-1]).any()
     assert (frames[-1] == frames[-2]).all()
-    stream = TroubledStream(jpegs(frames[:20]), 1)
+    stream = FaultyStream(jpegs(frames[:20]), 1)
     try:
         with open_source(stream.url) as source:
             assert source.live
@@ -85,11 +85,11 @@ def test_what_was_lost_told_twice_or_has_no_evidence_is_counted(tmp_path: Path) 
         record(3, "opened", "e", camera="yard"),
         record(9, "opened", "f"),  # its step was lost
     ]
-    ledger = Ledger(tmp_path / "cell")
-    ledger.look()
+    auditor = AlertAuditor(tmp_path / "cell")
+    auditor.read_store()
     (run / "journal.sqlite").unlink()  # for lack of room
-    ledger.look()
-    account = ledger.account(taken)
+    auditor.read_store()
+    account = auditor.audit(taken)
     assert (account.alerts, account.lost, account.twice, account.resent) == (3, 1, 2, 1)
     assert (account.unrecorded, account.without_evidence) == (1, 2)
 
@@ -115,15 +115,15 @@ def test_things_are_done_when_they_are_due() -> None:
 
 
 def test_who_was_killed_is_back_with_the_next_frame(tmp_path: Path) -> None:
-    killer = Killer(tmp_path, ["cell"], 0)
-    killer.strike({"cell": 5.0})
+    killer = ProcessKiller(tmp_path, ["cell"], 0)
+    killer.kill_one({"cell": 5.0})
     assert killer.kills == []  # there is no such process
     kill = Kill("cell", time.monotonic(), restarts=2.0)
     killer.kills.append(kill)
-    killer.look({"cell": 2.0}, {"cell": 90.0})  # what the one before had told last
-    killer.look({"cell": 3.0}, {"cell": 92.0})
+    killer.note_recoveries({"cell": 2.0}, {"cell": 90.0})  # what the one before had told last
+    killer.note_recoveries({"cell": 3.0}, {"cell": 92.0})
     assert kill.back_s is None
-    killer.look({"cell": 3.0}, {"cell": 93.0})
+    killer.note_recoveries({"cell": 3.0}, {"cell": 93.0})
     assert kill.back_s is not None
 
 

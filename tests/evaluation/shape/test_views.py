@@ -16,7 +16,7 @@ from visup.evaluation.shape.view_queries import (
     SIZES,
     cut_by_border,
     draw_queries,
-    turned_and_scaled,
+    rotated_and_scaled,
     with_contour_noise,
 )
 
@@ -111,7 +111,7 @@ def test_a_border_takes_its_share(side: int) -> None:
 def test_turning_turns_clockwise() -> None:
     arrow = np.zeros((60, 60), dtype=bool)
     arrow[28:32, 5:55] = arrow[20:40, 45:55] = True
-    seen = turned_and_scaled(arrow, np.pi / 2, 100.0)
+    seen = rotated_and_scaled(arrow, np.pi / 2, 100.0)
     rows = np.flatnonzero(seen.any(axis=1))
     thickness = seen.sum(axis=1)
     assert thickness[rows[-8:]].mean() > 2 * thickness[rows[:8]].mean()

@@ -18,7 +18,7 @@ from typing import Any
 
 from tests.oracles import recognition_oracle, recognition_tasks
 from visup.evaluation.figures import Progress, silent
-from visup.evaluation.reasoning.filter_laws import DRAWN_BOUND, drawn_distance
+from visup.evaluation.reasoning.filter_laws import MAX_MEAN_DIFFERENCE, random_grammar_distance
 from visup.tasks.automaton.automaton import END
 from visup.tasks.automaton.hidden_phases import (
     ActionEvidence,
@@ -293,7 +293,7 @@ def evaluate_recognition(
 
 def _supervised(grammars: int, first: int) -> dict[str, Any]:
     """How far supervision is from certified, over random grammars."""
-    found = [drawn_distance(seed) for seed in range(first, first + grammars)]
+    found = [random_grammar_distance(seed) for seed in range(first, first + grammars)]
     return {
         "supervised_grammars": grammars,
         "supervision_differs_worst": max(d.worst for d in found),
@@ -322,7 +322,7 @@ def _held(figures: Mapping[str, Any]) -> dict[str, bool]:
     worst = max(figures["worst_difference"], figures["worst_difference_of_success"])
     return {
         "as the oracle": worst <= TOLERANCE and figures["other_stage_or_status"] == 0,
-        "supervision as certified": figures["supervision_differs_mean"] <= DRAWN_BOUND,
+        "supervision as certified": figures["supervision_differs_mean"] <= MAX_MEAN_DIFFERENCE,
         "right stage": figures[f"right_stage_{SCORED_MEAN_S:g}s"] >= 0.95,
         "2,000 steps/s at 50 stages": figures["steps_per_s_50"] >= 2_000,
         "linear to 500 stages": max(growth, unsure) <= 10 * CLOCK_SLACK,

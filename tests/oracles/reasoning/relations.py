@@ -120,7 +120,7 @@ def changes(one: tuple[float, ...], two: tuple[float, ...], minutes: float, seed
         edges = corners + 0.5 * rng.standard_normal(corners.shape)
         boxes = np.concatenate([edges[:, :2], edges[:, 2:] - edges[:, :2]], axis=1)
         kept = watch_boxes(kept, (0, 1), boxes, k / FPS)
-        states = np.append(kept.latch.state[:, 0], kept.rcc8)
+        states = np.append(kept.hysteresis.state[:, 0], kept.rcc8)
         # Trends are known once their window is filled.
         if k / FPS > 2.0:
             found += int((states != settled).sum()) if settled is not None else 0

@@ -11,10 +11,10 @@ from tests.tasks.scripted import RETRIES, RelationSpan, Script, play
 from tests.tasks.supervision.test_missions import NAMES, run
 from visup.agent import Mind
 from visup.evaluation.reasoning.filter_laws import (
-    BOUND,
-    Recorded,
-    distance_to_certified,
-    drawn_distance,
+    MAX_DIFFERENCE,
+    Observations,
+    distance_to_reference,
+    random_grammar_distance,
 )
 from visup.tasks import load_task, parse_task
 from visup.tasks.actions.actions import known_actions
@@ -53,7 +53,7 @@ def model_of(task: Task) -> MonitoredPhases:
     return MonitoredPhases(task, vocabulary.meanings, DEFAULT_SETTINGS, vocabulary.evaluators)
 
 
-def recorded(model: MonitoredPhases, minds: Sequence[Mind]) -> Recorded:
+def recorded(model: MonitoredPhases, minds: Sequence[Mind]) -> Observations:
     """What supervision saw of the steps of its task, from where the task begins."""
     followed = [m for m in minds if m.memory["tasks"][0].posterior is not None]
     observations = []
@@ -78,9 +78,9 @@ def test_supervision_is_within_its_error_bound_on_scripted_scenes(
 ) -> None:
     played = play(task_reasoner([task]), Script(spans), 28.0)
     model = model_of(task)
-    distance = distance_to_certified(model, recorded(model, played.minds))
+    distance = distance_to_reference(model, recorded(model, played.minds))
     assert distance.lost < 1e-6
-    assert distance.worst <= BOUND
+    assert distance.worst <= MAX_DIFFERENCE
 
 
 @pytest.mark.skipif(
@@ -89,16 +89,18 @@ def test_supervision_is_within_its_error_bound_on_scripted_scenes(
 @pytest.mark.parametrize("name", NAMES)
 def test_supervision_is_within_its_error_bound_on_missions(name: str) -> None:
     model = model_of(load_task("dock"))
-    distance = distance_to_certified(model, recorded(model, run(name).minds))
+    distance = distance_to_reference(model, recorded(model, run(name).minds))
     assert distance.lost < 1e-6
-    assert distance.worst <= BOUND
+    assert distance.worst <= MAX_DIFFERENCE
 
 
 def test_without_merging_both_filters_agree() -> None:
-    distances = [drawn_distance(seed) for seed in (0, 2, 3, 5)]
+    distances = [random_grammar_distance(seed) for seed in (0, 2, 3, 5)]
     assert max(d.worst for d in distances) < 1e-9
 
 
 def test_merging_different_monitors_causes_an_error() -> None:
     """The law can fail: random observations that follow no course make merging tell."""
-    assert drawn_distance(9, steps=16).worst > BOUND  # the reference has few hypotheses until then
+    assert (
+        random_grammar_distance(9, steps=16).worst > MAX_DIFFERENCE
+    )  # the reference has few hypotheses until then

@@ -268,17 +268,17 @@ def totals_closing(figures: Figures) -> Iterator[str]:
 
 def stepping_closing(figures: Figures) -> Iterator[str]:
     """The totals, and the thresholds that were missed."""
-    from visup.evaluation.runtime.stepping import missed
+    from visup.evaluation.runtime.stepping import missed_bars
 
     yield from totals_closing(figures)
-    yield from missed(dict(figures))
+    yield from missed_bars(dict(figures))
 
 
 def stepping_failed(figures: Figures) -> bool:
     """Whether a threshold was missed."""
-    from visup.evaluation.runtime.stepping import missed
+    from visup.evaluation.runtime.stepping import missed_bars
 
-    return bool(missed(dict(figures)))
+    return bool(missed_bars(dict(figures)))
 
 
 def failures_closing(template: str) -> Callable[[Figures], Iterator[str]]:

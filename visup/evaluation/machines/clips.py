@@ -13,7 +13,7 @@ from visup.evaluation.missions.files import read_json
 from visup.evaluation.missions.scores import TrueStage
 from visup.teaching.briefs import ClipOutline, clip_video, read_clip_outlines
 
-TOLERANCE_S = 0.7
+MIN_TOLERANCE_S = 0.7
 """Least tolerance of annotated times, seconds."""
 
 
@@ -40,7 +40,7 @@ class Brief:
     fov_vertical_deg: float | None = None
 
     @property
-    def shown(self) -> tuple[ClipOutline, ...]:
+    def outlines(self) -> tuple[ClipOutline, ...]:
         """All outlines, actors first."""
         return (*self.actors, *self.others)
 
@@ -68,22 +68,22 @@ def read_brief(folder: Path) -> Brief:
         SettingsError: The brief or a video is missing, or the brief is not valid.
     """
     path = folder / "brief.json"
-    shown, told = read_clip_outlines(path), read_json(path)
-    if "task" not in told:
+    outlines, document = read_clip_outlines(path), read_json(path)
+    if "task" not in document:
         raise SettingsError(
             'this brief cannot be used: it names no "task"',
             where=str(path),
             expected="a file in the folder, or the name of a shipped task",
         )
-    task = str(told["task"])
+    task = str(document["task"])
     return Brief(
         folder,
         clip_video(folder),
-        str(told.get("family", folder.name)),
+        str(document.get("family", folder.name)),
         str(folder / task) if (folder / task).is_file() else task,
-        tuple(s for s in shown if s.in_task),
-        tuple(s for s in shown if not s.in_task),
-        told.get("fov_vertical_deg"),
+        tuple(outline for outline in outlines if outline.in_task),
+        tuple(outline for outline in outlines if not outline.in_task),
+        document.get("fov_vertical_deg"),
     )
 
 
@@ -94,47 +94,47 @@ def read_truth(folder: Path) -> MachineTruth:
         SettingsError: It is missing or not valid.
     """
     path = folder / "truth.json"
-    given = read_json(path)
+    document = read_json(path)
     try:
-        return parse_truth(given)
-    except (KeyError, TypeError, ValueError) as fault:
+        return parse_truth(document)
+    except (KeyError, TypeError, ValueError) as error:
         raise SettingsError(
-            f"this truth cannot be used: {type(fault).__name__}: {fault}", where=str(path)
-        ) from fault
+            f"this truth cannot be used: {type(error).__name__}: {error}", where=str(path)
+        ) from error
 
 
-def parse_truth(given: Mapping[str, Any]) -> MachineTruth:
+def parse_truth(document: Mapping[str, Any]) -> MachineTruth:
     """Parse a `truth.json`; missing parts are not scored."""
     stages = tuple(
         TrueStage(str(s["stage"]), float(s["from_s"]), float(s["to_s"]), str(s["outcome"]))
-        for s in given.get("stages", ())
+        for s in document.get("stages", ())
     )
-    accepted = given.get("accept") or ([given["verdict"]] if "verdict" in given else [])
-    contacts, moves = given.get("contacts"), given.get("moves")
+    accepted = document.get("accept") or ([document["verdict"]] if "verdict" in document else [])
+    contacts, moves = document.get("contacts"), document.get("moves")
     return MachineTruth(
         stages,
         frozenset(map(str, accepted)),
-        max(TOLERANCE_S, float(given.get("tolerance_s", 0.0))),
-        tuple(_true_boxes(given.get("boxes", ()))),
+        max(MIN_TOLERANCE_S, float(document.get("tolerance_s", 0.0))),
+        tuple(_true_boxes(document.get("boxes", ()))),
         None if contacts is None else tuple(_contact(c) for c in contacts),
         None if moves is None else tuple(_interval((str(m["what"]),), m) for m in moves),
     )
 
 
-def _true_boxes(given: Any) -> Iterator[TrueBoxes]:
+def _true_boxes(rows: Any) -> Iterator[TrueBoxes]:
     """Boxes by frame; objects that are out of view, hidden or not annotated have none."""
-    for row in given:
+    for row in rows:
         boxes = {n: tuple(map(float, b)) for n, b in row.items() if n != "frame" and _is_box(b)}
         yield TrueBoxes(int(row["frame"]), boxes)
 
 
-def _is_box(given: Any) -> bool:
-    return isinstance(given, list) and len(given) == 4 and min(given[2:]) > 0
+def _is_box(value: Any) -> bool:
+    return isinstance(value, list) and len(value) == 4 and min(value[2:]) > 0
 
 
-def _contact(given: Mapping[str, Any]) -> Interval:
-    return _interval(tuple(sorted((str(given["a"]), str(given["b"])))), given)
+def _contact(entry: Mapping[str, Any]) -> Interval:
+    return _interval(tuple(sorted((str(entry["a"]), str(entry["b"])))), entry)
 
 
-def _interval(who: tuple[str, ...], given: Mapping[str, Any]) -> Interval:
-    return Interval(who, float(given["from_s"]), float(given["to_s"]))
+def _interval(names: tuple[str, ...], entry: Mapping[str, Any]) -> Interval:
+    return Interval(names, float(entry["from_s"]), float(entry["to_s"]))

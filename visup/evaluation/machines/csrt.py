@@ -30,7 +30,7 @@ from visup.teaching.outline_teaching import views_of
 from visup.testing import region_of
 
 SIMILARITY = 0.9
-LEAST_SIDE = 4
+MIN_SIDE_PX = 4
 """Least width or height of a box within the image, pixels; smaller ones are out of view."""
 
 PixelBox = tuple[int, int, int, int]
@@ -42,27 +42,31 @@ class BoxTracker:
 
     Attributes:
         view: The taught view.
-        starts: Frame in which it starts.
+        start_frame: Frame in which it starts.
         outlined: Whether the object was outlined in that frame.
     """
 
     view: TaughtView
-    starts: int
+    start_frame: int
     outlined: bool
     _tracker: cv2.Tracker | None = None
 
     def track(self, frame: Frame) -> PixelBox | None:
         """Its box in the next frame, or None if lost."""
         image = frame.image
-        if frame.index < self.starts:
+        if frame.index < self.start_frame:
             return None
         if self._tracker is None:
             box = self.view.bbox if self.outlined else best_match(self.view, image)
             self._tracker = cv2.TrackerCSRT.create()
             self._tracker.init(image, box)
             return box
-        found, told = self._tracker.update(image)
-        return (int(told[0]), int(told[1]), int(told[2]), int(told[3])) if found else None
+        tracked, tracked_box = self._tracker.update(image)
+        return (
+            (int(tracked_box[0]), int(tracked_box[1]), int(tracked_box[2]), int(tracked_box[3]))
+            if tracked
+            else None
+        )
 
 
 def best_match(view: TaughtView, image: NDArray[np.uint8]) -> PixelBox:
@@ -70,12 +74,12 @@ def best_match(view: TaughtView, image: NDArray[np.uint8]) -> PixelBox:
     x, y, w, h = view.bbox
     left, top = x - view.origin[0], y - view.origin[1]
     scale = image.shape[1] / view.frame_size[0]
-    width = min(image.shape[1], max(LEAST_SIDE, round(w * scale)))
-    height = min(image.shape[0], max(LEAST_SIDE, round(h * scale)))
+    width = min(image.shape[1], max(MIN_SIDE_PX, round(w * scale)))
+    height = min(image.shape[0], max(MIN_SIDE_PX, round(h * scale)))
     template = cv2.resize(view.image[top : top + h, left : left + w], (width, height))
     score = cv2.matchTemplate(image, template, cv2.TM_CCOEFF_NORMED)
-    _, _, _, at = cv2.minMaxLoc(score)
-    return int(at[0]), int(at[1]), width, height
+    _, _, _, best = cv2.minMaxLoc(score)
+    return int(best[0]), int(best[1]), width, height
 
 
 @dataclass(slots=True)
@@ -100,9 +104,9 @@ class BoxRegions:
             box = tracker.track(frame)
             region = None if box is None else box_region(box, number, frame.size)
             if region is not None:
-                yield from self._told(region, tracker.view.name, frame.time)
+                yield from self._percepts(region, tracker.view.name, frame.time)
 
-    def _told(self, region: Region, name: str, now: float) -> Iterator[Percept]:
+    def _percepts(self, region: Region, name: str, now: float) -> Iterator[Percept]:
         yield Percept("region", region, now, "csrt")
         named = Hypothesis(region.id, name, 0, SIMILARITY)
         yield Percept("hypothesis", named, now, "csrt", SIMILARITY)
@@ -112,7 +116,7 @@ def box_region(box: PixelBox, number: int, size: tuple[int, int]) -> Region | No
     """The part of a box inside an image of (width, height), or None if too small."""
     x, y, w, h = box
     left, top, right, bottom = max(0, x), max(0, y), min(size[0], x + w), min(size[1], y + h)
-    if min(right - left, bottom - top) < LEAST_SIDE:
+    if min(right - left, bottom - top) < MIN_SIDE_PX:
         return None
     full = np.ones((bottom - top, right - left), dtype=bool)
     return region_of(full, number, at=(left, top), size=size)
@@ -120,9 +124,9 @@ def box_region(box: PixelBox, number: int, size: tuple[int, int]) -> Region | No
 
 def box_behaviour(brief: Brief) -> BoxRegions:
     """The behaviour of the baseline for a clip."""
-    own = brief.video.resolve()
+    clip_video = brief.video.resolve()
     trackers = []
-    for shown, view in zip(brief.shown, views_of(brief.shown), strict=True):
-        here = shown.video.resolve() == own
-        trackers.append(BoxTracker(view, shown.frame if here else 0, here))
+    for outline, view in zip(brief.outlines, views_of(brief.outlines), strict=True):
+        same_clip = outline.video.resolve() == clip_video
+        trackers.append(BoxTracker(view, outline.frame if same_clip else 0, same_clip))
     return BoxRegions(trackers)

@@ -40,14 +40,14 @@ class SceneCamera:
         last, self._last = self._last, (frame.index, scene)
         if last is None:
             return
-        self._track, motion = track_camera(self._track, last[1], scene, self._taken(*last))
+        self._track, motion = track_camera(self._track, last[1], scene, self._object_mask(*last))
         if motion is not None:
             motion = motion.copy()
             motion[:, 2] /= scene.scale
             yield self.contract.percept(frame, CameraMotion(motion))
 
-    def _taken(self, index: int, scene: Scene) -> NDArray[np.bool_]:
+    def _object_mask(self, index: int, scene: Scene) -> NDArray[np.bool_]:
         """(h, w) objects in a frame at working size."""
         size = scene.size
-        there = (self._mask(index) > 0).astype(np.uint8)
-        return np.asarray(cv2.resize(there, size, interpolation=cv2.INTER_NEAREST) > 0)
+        objects = (self._mask(index) > 0).astype(np.uint8)
+        return np.asarray(cv2.resize(objects, size, interpolation=cv2.INTER_NEAREST) > 0)

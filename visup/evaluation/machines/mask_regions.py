@@ -25,7 +25,7 @@ from visup.evaluation.simulation.truth_masks import LAG_S, TrueMask, moved_since
 from visup.percepts.opencv_names import opencv_name
 from visup.testing import region_of
 
-LEAST_PX = 30
+MIN_VISIBLE_PX = 30
 """Least visible area of an object, pixels."""
 
 VELOCITY_SIGMA = 1.0
@@ -48,24 +48,28 @@ class MaskRegions:
     contract: Contract = field(
         default=Contract("masks", gives=("region", "hypothesis", "health")), init=False
     )
-    _past: list[dict[str, TrueMask]] = field(default_factory=list, init=False)
+    _history: list[dict[str, TrueMask]] = field(default_factory=list, init=False)
 
     def perceive(
         self, frame: Frame, observation: Observation, directives: Sequence[Directive]
     ) -> Iterable[Percept]:
         """Report one frame; see `Behaviour`."""
         yield Percept("health", Health(HealthStatus.OK), frame.time, "masks")
-        picture = self.mask(frame.index)
-        here = {n: m for n, v in self.labels.items() if (m := true_mask(picture == v)) is not None}
+        label_image = self.mask(frame.index)
+        current = {
+            n: m for n, v in self.labels.items() if (m := true_mask(label_image == v)) is not None
+        }
         lag = max(1, round(LAG_S * self.fps))
-        self._past = [*self._past[-lag:], here]
-        span = (len(self._past) - 1) / self.fps
-        moved = moved_since(self._past[0], here, span, frame.size) if span else here
+        self._history = [*self._history[-lag:], current]
+        span = (len(self._history) - 1) / self.fps
+        with_velocity = (
+            moved_since(self._history[0], current, span, frame.size) if span else current
+        )
         for number, (name, value) in enumerate(sorted(self.labels.items()), start=1):
-            mask = picture == value
-            if np.count_nonzero(mask) < LEAST_PX:
+            mask = label_image == value
+            if np.count_nonzero(mask) < MIN_VISIBLE_PX:
                 continue
-            velocity = moved[name].velocity
+            velocity = with_velocity[name].velocity
             region = replace(
                 region_of(mask, number, velocity or (0.0, 0.0)),
                 velocity_sigma=0.0 if velocity is None else VELOCITY_SIGMA,
@@ -107,7 +111,7 @@ def read_mask(folder: Path, index: int) -> NDArray[np.uint8]:
         SettingsError: There is no such mask, or it cannot be read.
     """
     path = folder / "masks" / f"{index:05d}.png"
-    picture = cv2.imread(opencv_name(path), cv2.IMREAD_GRAYSCALE)
-    if picture is None:
+    label_image = cv2.imread(opencv_name(path), cv2.IMREAD_GRAYSCALE)
+    if label_image is None:
         raise SettingsError("a mask is missing or cannot be read", where=str(path))
-    return np.asarray(picture, dtype=np.uint8)
+    return np.asarray(label_image, dtype=np.uint8)

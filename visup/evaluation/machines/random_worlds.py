@@ -14,7 +14,7 @@ from visup.evaluation.machines.runner import evaluate_machines
 from visup.evaluation.machines.scores import machine_total
 from visup.evaluation.workers import each_in_processes
 
-SEEDS_APART = 10_000
+SEED_STRIDE = 10_000
 """Distance between the world seeds of two evaluation seeds."""
 
 
@@ -66,23 +66,27 @@ def evaluate_random(
     Raises:
         SettingsError: There is no kind of a name.
     """
-    trials = planned(kinds, count, seed, RandomTrial("", 0, eyes, baseline, limit))
+    trials = plan_trials(kinds, count, seed, RandomTrial("", 0, eyes, baseline, limit))
     worlds: dict[str, dict[str, Any]] = {}
-    shares = workers or os.cpu_count() or 1
-    for _, (name, scores) in each_in_processes(score, trials, shares):
+    processes = workers or os.cpu_count() or 1
+    for _, (name, scores) in each_in_processes(score_world, trials, processes):
         worlds[name] = scores
         progress(f"{len(worlds)} of {count} worlds")
     ordered = dict(sorted(worlds.items()))
-    watched = dict.fromkeys(t.kind for t in trials)
-    by_kind = {kind: [w for w in ordered.values() if w["kind"] == kind] for kind in watched}
-    items = {kind: machine_total(found) for kind, found in by_kind.items() if found}
+    tried_kinds = dict.fromkeys(t.kind for t in trials)
+    by_kind = {kind: [w for w in ordered.values() if w["kind"] == kind] for kind in tried_kinds}
+    items = {
+        kind: machine_total(scores_of_kind)
+        for kind, scores_of_kind in by_kind.items()
+        if scores_of_kind
+    }
     figures = {"total": machine_total(list(ordered.values())), "items": items, "worlds": ordered}
-    rivals = [w["baseline"] for w in ordered.values() if "baseline" in w]
-    return figures | ({"baseline": machine_total(rivals)} if rivals else {})
+    baselines = [w["baseline"] for w in ordered.values() if "baseline" in w]
+    return figures | ({"baseline": machine_total(baselines)} if baselines else {})
 
 
-def planned(
-    kinds: Sequence[str], count: int, seed: int, like: RandomTrial
+def plan_trials(
+    kinds: Sequence[str], count: int, seed: int, template: RandomTrial
 ) -> tuple[RandomTrial, ...]:
     """The planned trials: kinds in turn, each world with its own seed.
 
@@ -90,7 +94,7 @@ def planned(
         kinds: Kinds of worlds; all if empty.
         count: Number of worlds.
         seed: Random seed.
-        like: Template of the trials.
+        template: Template of the trials.
     """
     from visup.render.worlds.kinds.catalogue import known_kinds
 
@@ -98,16 +102,16 @@ def planned(
     return tuple(
         RandomTrial(
             known[number % len(known)],
-            seed * SEEDS_APART + number,
-            like.eyes,
-            like.baseline,
-            like.limit,
+            seed * SEED_STRIDE + number,
+            template.eyes,
+            template.baseline,
+            template.limit,
         )
         for number in range(count)
     )
 
 
-def score(trial: RandomTrial) -> tuple[str, dict[str, Any]]:
+def score_world(trial: RandomTrial) -> tuple[str, dict[str, Any]]:
     """Render one world, watch it, and discard it.
 
     Returns:
@@ -123,6 +127,6 @@ def score(trial: RandomTrial) -> tuple[str, dict[str, Any]]:
         figures = evaluate_machines(
             folder, eyes=trial.eyes, baseline=trial.baseline, limit=trial.limit
         )
-    told: dict[str, Any] = figures["items"][world.name]
-    extra = {"kind": trial.kind, "outcome": truth["outcome"], "accept": truth["accept"]}
-    return world.name, told | extra
+    scores: dict[str, Any] = figures["items"][world.name]
+    truth_keys = {"kind": trial.kind, "outcome": truth["outcome"], "accept": truth["accept"]}
+    return world.name, scores | truth_keys

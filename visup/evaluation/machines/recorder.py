@@ -21,10 +21,10 @@ from visup.rules.predicates.snapshot import Snapshot
 from visup.rules.predicates.vocabulary import PREDICATES
 from visup.runs.wiring import final_verdict
 
-BRIDGED_S = 0.5
+MAX_BRIDGED_S = 0.5
 """Shorter breaks of a contact or movement are bridged, seconds: annotators do not notice them either."""
 
-SHORTEST_S = 0.3
+MIN_INTERVAL_S = 0.3
 """Shorter contacts and movements are ignored, seconds."""
 
 
@@ -38,18 +38,26 @@ class IntervalLog:
 
     spans: dict[tuple[str, ...], list[list[float]]] = field(default_factory=dict)
 
-    def add(self, who: tuple[str, ...], now: float) -> None:
+    def add(self, names: tuple[str, ...], now: float) -> None:
         """Add a moment, not before the last one."""
-        spans = self.spans.setdefault(who, [])
-        if spans and now - spans[-1][1] <= BRIDGED_S:
+        spans = self.spans.setdefault(names, [])
+        if spans and now - spans[-1][1] <= MAX_BRIDGED_S:
             spans[-1][1] = now
         else:
             spans.append([now, now])
 
     def intervals(self) -> tuple[Interval, ...]:
         """All intervals that are long enough, by names and time."""
-        found = ((who, a, b) for who, spans in sorted(self.spans.items()) for a, b in spans)
-        return tuple(Interval(who, a, b) for who, a, b in found if b - a >= SHORTEST_S)
+        intervals = (
+            (names, begin, end)
+            for names, spans in sorted(self.spans.items())
+            for begin, end in spans
+        )
+        return tuple(
+            Interval(names, begin, end)
+            for names, begin, end in intervals
+            if end - begin >= MIN_INTERVAL_S
+        )
 
 
 @dataclass(slots=True)
@@ -69,22 +77,22 @@ class MachineRecorder:
     interrupted_in: str | None = None
     last: Mind | None = None
     _clock: float = field(default_factory=time.perf_counter)
-    _times: list[float] = field(default_factory=list)
+    _step_seconds: list[float] = field(default_factory=list)
 
     def __call__(self, step: Step, frame: Frame) -> None:
         """Add one step."""
         now = time.perf_counter()
-        self._times.append(now - self._clock)
+        self._step_seconds.append(now - self._clock)
         mind = step.mind
-        who = dict(actor_objects(mind, self.others))
+        object_ids = dict(actor_objects(mind, self.others))
         self.boxes[step.frame_index] = {
             name: mind.objects[i].region.bbox
-            for name, i in who.items()
+            for name, i in object_ids.items()
             if mind.objects[i].last_seen == step.time and mind.objects[i].presence is Presence.SEEN
         }
-        for pair in touching(mind, who):
+        for pair in touching(mind, object_ids):
             self.contacts.add(pair, step.time)
-        for name in moving(mind, who):
+        for name in moving(mind, object_ids):
             self.moves.add((name,), step.time)
         self.events += [e for e in step.events if e.kind.startswith("stage_")]
         self.alerts += [
@@ -108,16 +116,16 @@ class MachineRecorder:
         verdict = final_verdict(self.last) if self.last else Verdict.UNKNOWN
         return MachineReport(
             verdict=verdict.value,
-            stages=told_stages(self.events, self._unsafe(verdict)),
+            stages=reported_stages(self.events, self._unsafe_stage(verdict)),
             boxes=self.boxes,
             contacts=self.contacts.intervals(),
             moves=self.moves.intervals(),
             alerts=tuple(self.alerts),
             seconds=self.last.time if self.last else 0.0,
-            ms=1000 * statistics.median(self._times) if self._times else None,
+            ms=1000 * statistics.median(self._step_seconds) if self._step_seconds else None,
         )
 
-    def _unsafe(self, verdict: Verdict) -> str | None:
+    def _unsafe_stage(self, verdict: Verdict) -> str | None:
         return self.interrupted_in if verdict is Verdict.INTERRUPTED else None
 
 
@@ -128,50 +136,52 @@ def actor_objects(mind: Mind, others: Collection[str]) -> Iterator[tuple[str, in
         bound |= {b.actor: b.object_id for b in task.bindings if b.object_id in mind.objects}  # type: ignore[misc]  # an id that is known is not None
     yield from bound.items()
     for name in others:
-        like = [b for b in mind.present() if b.name == name and b.id not in bound.values()]
-        if like and name not in bound:
-            yield name, max(like, key=lambda b: (b.strength, -b.id)).id
+        candidates = [b for b in mind.present() if b.name == name and b.id not in bound.values()]
+        if candidates and name not in bound:
+            yield name, max(candidates, key=lambda b: (b.strength, -b.id)).id
 
 
-def touching(mind: Mind, who: Mapping[str, int]) -> Iterator[tuple[str, str]]:
+def touching(mind: Mind, object_ids: Mapping[str, int]) -> Iterator[tuple[str, str]]:
     """Ordered pairs of names whose objects are believed to touch."""
-    for (a, i), (b, j) in combinations(sorted(who.items()), 2):
+    for (a, i), (b, j) in combinations(sorted(object_ids.items()), 2):
         if mind.truth("in_contact", i, j) is Truth.TRUE:
             yield a, b
 
 
-def moving(mind: Mind, who: Mapping[str, int]) -> Iterator[str]:
+def moving(mind: Mind, object_ids: Mapping[str, int]) -> Iterator[str]:
     """Names whose objects are believed to move."""
     facts = Snapshot(mind)
     codes = PREDICATES["moving"].evaluate(facts)
-    for name, i in sorted(who.items()):
+    for name, i in sorted(object_ids.items()):
         if i in facts.row and codes[facts.row[i]] == 1:
             yield name
 
 
-def told_stages(events: Sequence[Event], unsafe: str | None = None) -> tuple[ReportedStage, ...]:
+def reported_stages(
+    events: Sequence[Event], unsafe_stage: str | None = None
+) -> tuple[ReportedStage, ...]:
     """The reported stages: beginning and final outcome of each.
 
     Args:
         events: Stage events by time.
-        unsafe: The stage in which the task was interrupted, or None.
+        unsafe_stage: The stage in which the task was interrupted, or None.
 
     Returns:
         One for each reported beginning of a stage; it is complete unless it was last reported to fail or to
         make no progress.
     """
-    told: list[ReportedStage] = []
+    stages: list[ReportedStage] = []
     for event in events:
         name = str(event.data.get("stage", ""))
-        at = next((k for k in reversed(range(len(told))) if told[k].stage == name), None)
+        index = next((k for k in reversed(range(len(stages))) if stages[k].stage == name), None)
         if event.kind == "stage_started":
-            told.append(ReportedStage(name, event.time, "complete", event.data.get("began")))
-        elif at is not None and event.kind in _OUTCOMES:
-            told[at] = replace(told[at], outcome=_OUTCOMES[event.kind])
-    last = next((k for k in reversed(range(len(told))) if told[k].stage == unsafe), None)
+            stages.append(ReportedStage(name, event.time, "complete", event.data.get("began")))
+        elif index is not None and event.kind in _OUTCOMES:
+            stages[index] = replace(stages[index], outcome=_OUTCOMES[event.kind])
+    last = next((k for k in reversed(range(len(stages))) if stages[k].stage == unsafe_stage), None)
     if last is not None:
-        told[last] = replace(told[last], outcome="unsafe")
-    return tuple(told)
+        stages[last] = replace(stages[last], outcome="unsafe")
+    return tuple(stages)
 
 
 _OUTCOMES = {

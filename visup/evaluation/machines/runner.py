@@ -63,20 +63,20 @@ def evaluate_machines(
         if baseline and not eyes:
             items[clip.name]["baseline"] = machine_scores(watch_boxes(brief, limit), truth)
     figures = {"total": machine_total(list(items.values())), "items": items}
-    rivals = [i["baseline"] for i in items.values() if "baseline" in i]
-    return figures | ({"baseline": machine_total(rivals)} if rivals else {})
+    baselines = [i["baseline"] for i in items.values() if "baseline" in i]
+    return figures | ({"baseline": machine_total(baselines)} if baselines else {})
 
 
 def _with_masks(folder: Path) -> list[Path]:
-    found = [f for f in clip_folders(folder) if has_masks(f)]
-    if not found:
+    folders = [f for f in clip_folders(folder) if has_masks(f)]
+    if not folders:
         raise SettingsError(
             "no clip here has masks to see by",
             where=str(folder),
             expected="folders with masks/00000.png, ... beside brief.json",
             hint="leave --eyes out to see by the pictures",
         )
-    return found
+    return folders
 
 
 def clip_settings(brief: Brief) -> WatchSettings:
@@ -84,9 +84,9 @@ def clip_settings(brief: Brief) -> WatchSettings:
 
     Other taught things are bystanders.
     """
-    wanted = {a for task in load_tasks(brief.task) for a in task_actors(task)}
-    taught = [o.name for o in brief.actors if o.name in wanted]
-    others = [o.name for o in brief.shown if o.name not in wanted]
+    roles = {a for task in load_tasks(brief.task) for a in task_actors(task)}
+    taught = [o.name for o in brief.actors if o.name in roles]
+    others = [o.name for o in brief.outlines if o.name not in roles]
     return WatchSettings(
         source=str(brief.video),
         tasks=(brief.task,),
@@ -100,34 +100,34 @@ def watch_taught(brief: Brief, limit: int | None = None) -> MachineReport:
     """Watch a clip as `visup watch` does, taught from its brief."""
     with tempfile.TemporaryDirectory() as scratch:
         models = Path(scratch) / "taught.models"
-        store(models, views_of(brief.shown))
+        store(models, views_of(brief.outlines))
         settings = replace(clip_settings(brief), models=models)
-        return _watched(brief, settings, limit, lambda o: build_agent(settings, (o,)))
+        return _watch(brief, settings, limit, lambda o: build_agent(settings, (o,)))
 
 
 def watch_by_masks(brief: Brief, limit: int | None = None) -> MachineReport:
     """Watch a world with masks in place of perception."""
-    return _watched_by(mask_behaviours(brief.folder), brief, limit)
+    return _watch_with(mask_behaviours(brief.folder), brief, limit)
 
 
 def watch_boxes(brief: Brief, limit: int | None = None) -> MachineReport:
     """Watch a clip with the baseline."""
-    return _watched_by([box_behaviour(brief)], brief, limit)
+    return _watch_with([box_behaviour(brief)], brief, limit)
 
 
-def _watched_by(eyes: list[Behaviour], brief: Brief, limit: int | None) -> MachineReport:
+def _watch_with(behaviours: list[Behaviour], brief: Brief, limit: int | None) -> MachineReport:
     settings = clip_settings(brief)
-    return _watched(brief, settings, limit, lambda o: reasoning_agent(settings, (o,), eyes))
+    return _watch(brief, settings, limit, lambda o: reasoning_agent(settings, (o,), behaviours))
 
 
-def _watched(
+def _watch(
     brief: Brief, settings: WatchSettings, limit: int | None, make: Callable[[Observer], Agent]
 ) -> MachineReport:
-    record = MachineRecorder([o.name for o in brief.others])
-    agent = make(record)
+    recorder = MachineRecorder([o.name for o in brief.others])
+    agent = make(recorder)
     try:
         with open_video(settings) as source:
             agent.run(source, until=lambda s: limit is not None and s.frame_index + 1 >= limit)
     finally:
         agent.close()
-    return record.report()
+    return recorder.report()

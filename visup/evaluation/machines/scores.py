@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 from visup.evaluation.missions.scores import TrueStage, precision_recall_f1
 
 INTERVAL_TOLERANCE_S = 1.0
-ACTOR_IOU = 0.5
+MIN_ACTOR_IOU = 0.5
 BAD_OUTCOMES = ("failing", "unsafe")
 
 Box = tuple[float, ...]
@@ -29,7 +29,7 @@ Counts = tuple[int, int, int]
 class Interval:
     """A contact of two, or a movement of one: ordered names; begin and end in seconds."""
 
-    who: tuple[str, ...]
+    names: tuple[str, ...]
     from_s: float
     to_s: float
 
@@ -127,11 +127,11 @@ def machine_scores(report: MachineReport, truth: MachineTruth) -> dict[str, Any]
     end = report.seconds if report.seconds > 0.0 else float("inf")
     stages = [s for s in truth.stages if s.from_s <= end]
     dated = [s.dated for s in report.stages]
-    found = actor_counts(report.boxes or {}, truth.boxes)
+    box_counts = actor_counts(report.boxes or {}, truth.boxes)
     scores: dict[str, Any] = {
         "stage_counts": list(matched_stages(report.stages, stages, truth.tolerance_s)),
         "stage_dated_counts": list(matched_stages(dated, stages, truth.tolerance_s)),
-        "actor_counts": list(found),
+        "actor_counts": list(box_counts),
         "false_alerts": false_alerts(report.alerts, truth),
         "minutes": max(report.seconds, 1.0) / 60,
         "verdict": report.verdict,
@@ -141,18 +141,20 @@ def machine_scores(report: MachineReport, truth: MachineTruth) -> dict[str, Any]
     if truth.accept:
         scores |= {"verdicts_right": int(report.verdict in truth.accept), "verdicts": 1}
     if truth.contacts is not None:
-        counts = matched_intervals(report.contacts, _begun(truth.contacts, end))
+        counts = matched_intervals(report.contacts, _begun_before(truth.contacts, end))
         scores["contact_counts"] = list(counts)
     if truth.moves is not None:
-        scores["move_counts"] = list(matched_intervals(report.moves, _begun(truth.moves, end)))
+        scores["move_counts"] = list(
+            matched_intervals(report.moves, _begun_before(truth.moves, end))
+        )
     if report.ms is not None:
         scores["ms"] = report.ms
     return scores | figures_of(scores)
 
 
-def _begun(intervals: Sequence[Interval], end: float) -> list[Interval]:
+def _begun_before(intervals: Sequence[Interval], end: float) -> list[Interval]:
     """Intervals that begin before the end, cut at the end."""
-    return [Interval(i.who, i.from_s, min(i.to_s, end)) for i in intervals if i.from_s < end]
+    return [Interval(i.names, i.from_s, min(i.to_s, end)) for i in intervals if i.from_s < end]
 
 
 def figures_of(counted: Mapping[str, Any]) -> dict[str, Any]:
@@ -176,7 +178,7 @@ def machine_total(items: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Figures over all clips from summed counts, so that each stage, box and interval has equal weight."""
     total: dict[str, Any] = {
         key: [sum(i.get(key, (0,) * width)[k] for i in items) for k in range(width)]
-        for key, width in COUNTED.items()
+        for key, width in COUNT_WIDTHS.items()
     }
     for key in ("false_alerts", "minutes", "verdicts_right", "verdicts"):
         total[key] = sum(i.get(key, 0) for i in items)
@@ -186,7 +188,7 @@ def machine_total(items: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     return total | (figures_of(total) if items else {})
 
 
-COUNTED = {
+COUNT_WIDTHS = {
     "stage_counts": 3,
     "stage_dated_counts": 3,
     "actor_counts": 2,
@@ -196,25 +198,25 @@ COUNTED = {
 
 
 def matched_stages(
-    told: Sequence[ReportedStage], true: Sequence[TrueStage], tolerance_s: float
+    reported: Sequence[ReportedStage], ground_truth: Sequence[TrueStage], tolerance_s: float
 ) -> Counts:
     """Stages reported in time, in the correct order, with the correct outcome.
 
     Args:
-        told: Reported stages by time.
-        true: True stages in order.
+        reported: Reported stages by time.
+        ground_truth: True stages in order.
         tolerance_s: Tolerance of the beginning, seconds.
 
     Returns:
         True positives, false positives and false negatives of the longest common subsequence.
     """
 
-    def same(a: ReportedStage, b: TrueStage) -> bool:
+    def agree(a: ReportedStage, b: TrueStage) -> bool:
         near = abs(a.time - b.from_s) <= tolerance_s + 1e-9
         return near and a.stage == b.stage and a.outcome == b.outcome
 
-    right = longest_common(told, true, same)
-    return right, len(told) - right, len(true) - right
+    true_positives = longest_common(reported, ground_truth, agree)
+    return true_positives, len(reported) - true_positives, len(ground_truth) - true_positives
 
 
 A = TypeVar("A")
@@ -223,26 +225,26 @@ B = TypeVar("B")
 
 def longest_common(first: Sequence[A], second: Sequence[B], same: Callable[[A, B], bool]) -> int:
     """Length of the longest common subsequence."""
-    before = [0] * (len(second) + 1)
+    previous_row = [0] * (len(second) + 1)
     for a in first:
         row = [0]
         for k, b in enumerate(second):
-            row.append(max(before[k] + same(a, b), before[k + 1], row[k]))
-        before = row
-    return before[-1]
+            row.append(max(previous_row[k] + same(a, b), previous_row[k + 1], row[k]))
+        previous_row = row
+    return previous_row[-1]
 
 
-def matched_intervals(told: Sequence[Interval], true: Sequence[Interval]) -> Counts:
+def matched_intervals(reported: Sequence[Interval], ground_truth: Sequence[Interval]) -> Counts:
     """Intervals of the same objects whose begins and ends agree within a second, one to one.
 
     Intervals of the same objects are matched in order.
     """
-    right = 0
-    for who in sorted({i.who for i in true}):
-        mine = sorted((i.from_s, i.to_s) for i in told if i.who == who)
-        theirs = sorted((i.from_s, i.to_s) for i in true if i.who == who)
-        right += longest_common(mine, theirs, _agree)
-    return right, len(told) - right, len(true) - right
+    true_positives = 0
+    for names in sorted({i.names for i in ground_truth}):
+        reported_spans = sorted((i.from_s, i.to_s) for i in reported if i.names == names)
+        true_spans = sorted((i.from_s, i.to_s) for i in ground_truth if i.names == names)
+        true_positives += longest_common(reported_spans, true_spans, _agree)
+    return true_positives, len(reported) - true_positives, len(ground_truth) - true_positives
 
 
 def _agree(a: tuple[float, float], b: tuple[float, float]) -> bool:
@@ -250,38 +252,38 @@ def _agree(a: tuple[float, float], b: tuple[float, float]) -> bool:
 
 
 def actor_counts(
-    seen: Mapping[int, Mapping[str, Box]], true: Sequence[TrueBoxes]
+    reported: Mapping[int, Mapping[str, Box]], ground_truth: Sequence[TrueBoxes]
 ) -> tuple[int, int]:
     """Number of annotated boxes covered by a region with the actor's name, and of all in watched frames."""
-    right = scored = 0
-    for row in true:
-        if row.frame not in seen:
+    covered = scored = 0
+    for row in ground_truth:
+        if row.frame not in reported:
             continue
         for name, box in row.boxes.items():
             scored += 1
-            told = seen[row.frame].get(name)
-            right += told is not None and box_iou(told, box) >= ACTOR_IOU
-    return right, scored
+            reported_box = reported[row.frame].get(name)
+            covered += reported_box is not None and box_iou(reported_box, box) >= MIN_ACTOR_IOU
+    return covered, scored
 
 
 def box_iou(a: Box, b: Box) -> float:
     """Intersection over union of two boxes, 0 to 1."""
-    wide = min(a[0] + a[2], b[0] + b[2]) - max(a[0], b[0])
-    high = min(a[1] + a[3], b[1] + b[3]) - max(a[1], b[1])
-    both = max(0.0, wide) * max(0.0, high)
-    return both / (a[2] * a[3] + b[2] * b[3] - both)
+    width = min(a[0] + a[2], b[0] + b[2]) - max(a[0], b[0])
+    height = min(a[1] + a[3], b[1] + b[3]) - max(a[1], b[1])
+    intersection = max(0.0, width) * max(0.0, height)
+    return intersection / (a[2] * a[3] + b[2] * b[3] - intersection)
 
 
 def false_alerts(alerts: Sequence[ReportedAlert], truth: MachineTruth) -> int:
     """Number of alerts not explained by a stage that truly goes wrong."""
-    return sum(not _accounted(alert, truth) for alert in alerts)
+    return sum(not _is_explained(alert, truth) for alert in alerts)
 
 
-def _accounted(alert: ReportedAlert, truth: MachineTruth) -> bool:
+def _is_explained(alert: ReportedAlert, truth: MachineTruth) -> bool:
     """Whether a stage that goes wrong has begun, and the alert is about that stage or its violation."""
     for stage in truth.stages:
-        begun = alert.time >= stage.from_s - truth.tolerance_s - 1e-9
-        if stage.outcome not in BAD_OUTCOMES or not begun:
+        has_begun = alert.time >= stage.from_s - truth.tolerance_s - 1e-9
+        if stage.outcome not in BAD_OUTCOMES or not has_begun:
             continue
         if alert.kind == "stage_failing":
             if alert.stage == stage.stage:

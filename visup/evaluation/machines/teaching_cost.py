@@ -37,9 +37,9 @@ BOXES = (
     (500, 350, 50, 50),
 )
 """Boxes of the objects: x, y, width, height, pixels."""
-NOISE, NOISES = 2.0, 24
+NOISE_SIGMA, NOISE_IMAGES = 2.0, 24
 """Standard deviation of sensor noise in grey levels, and number of noise images."""
-WARM = 60
+WARM_UP_FRAMES = 60
 """Frames of warm-up that are not measured: compilation, and detection of the resting objects."""
 
 
@@ -60,21 +60,23 @@ def evaluate_teaching(
     Raises:
         SettingsError: There are too few frames.
     """
-    if frames < 2 * WARM:
+    if frames < 2 * WARM_UP_FRAMES:
         raise SettingsError(
             f"{frames} frames are too few",
-            expected=f"at least {2 * WARM}, so that half are measured",
+            expected=f"at least {2 * WARM_UP_FRAMES}, so that half are measured",
         )
     rng = np.random.default_rng(seed)
     desk = _desk(rng)
     with tempfile.TemporaryDirectory() as scratch:
         models = Path(scratch) / "taught.models"
-        taught_s = [_taught(models, view) for view in _views(desk)]
+        taught_s = [_teach_seconds(models, view) for view in _views(desk)]
         source = str(Path(scratch) / "none.mp4")
         agents = [build_agent(WatchSettings(source=source, models=m)) for m in (None, models)]
         progress("stepping")
         try:
-            times = np.array(list(_paired(agents, _frames(desk, frames, rng))))[WARM:]
+            times = np.array(list(_paired_seconds(agents, _frames(desk, frames, rng))))[
+                WARM_UP_FRAMES:
+            ]
         finally:
             for agent in agents:
                 agent.close()
@@ -89,21 +91,23 @@ def evaluate_teaching(
     return {"total": total, "items": {}}
 
 
-def _paired(agents: Sequence[Agent], frames: Iterator[Frame]) -> Iterator[tuple[float, ...]]:
+def _paired_seconds(
+    agents: Sequence[Agent], frames: Iterator[Frame]
+) -> Iterator[tuple[float, ...]]:
     """Seconds of each agent for each frame, in alternating order."""
     for frame in frames:
         order = range(len(agents)) if frame.index % 2 else reversed(range(len(agents)))
-        took = {k: _timed(agents[k], frame) for k in order}
-        yield tuple(took[k] for k in sorted(took))
+        seconds = {k: _step_seconds(agents[k], frame) for k in order}
+        yield tuple(seconds[k] for k in sorted(seconds))
 
 
-def _timed(agent: Agent, frame: Frame) -> float:
+def _step_seconds(agent: Agent, frame: Frame) -> float:
     start = time.process_time()
     agent.step(frame)
     return time.process_time() - start
 
 
-def _taught(models: Path, view: TaughtView) -> float:
+def _teach_seconds(models: Path, view: TaughtView) -> float:
     start = time.perf_counter()
     store(models, [view])
     return time.perf_counter() - start
@@ -121,15 +125,15 @@ def _desk(rng: np.random.Generator) -> Image:
     grain = rng.integers(110, 150, (SIZE[1] // 8, SIZE[0] // 8, 3)).astype(np.uint8)
     desk = cv2.resize(grain, SIZE, interpolation=cv2.INTER_CUBIC)
     for x, y, w, h in BOXES:
-        look = rng.integers(0, 256, (6, 6, 3)).astype(np.uint8)
-        desk[y : y + h, x : x + w] = cv2.resize(look, (w, h), interpolation=cv2.INTER_CUBIC)
+        texture = rng.integers(0, 256, (6, 6, 3)).astype(np.uint8)
+        desk[y : y + h, x : x + w] = cv2.resize(texture, (w, h), interpolation=cv2.INTER_CUBIC)
     return np.asarray(desk, dtype=np.uint8)
 
 
 def _frames(desk: Image, count: int, rng: np.random.Generator) -> Iterator[Frame]:
     """The desk with noise, and a disc that repeatedly crosses it below the objects."""
-    noises = [rng.normal(0.0, NOISE, desk.shape) for _ in range(NOISES)]
+    noises = [rng.normal(0.0, NOISE_SIGMA, desk.shape) for _ in range(NOISE_IMAGES)]
     for n in range(count):
-        picture = np.clip(desk + noises[n % NOISES], 0, 255).astype(np.uint8)
-        cv2.circle(picture, (20 + 4 * n % (SIZE[0] - 40), 440), 14, (30, 30, 220), -1)
-        yield Frame(n, n / FPS, picture)
+        image = np.clip(desk + noises[n % NOISE_IMAGES], 0, 255).astype(np.uint8)
+        cv2.circle(image, (20 + 4 * n % (SIZE[0] - 40), 440), 14, (30, 30, 220), -1)
+        yield Frame(n, n / FPS, image)

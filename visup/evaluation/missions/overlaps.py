@@ -16,15 +16,15 @@ from visup.evaluation.missions.recorder import MissionRecorder, ObservedObject
 from visup.evaluation.missions.scores import UNSCORED_START_S, MissionTruth
 from visup.percepts.opencv_names import opencv_name
 
-SMALLEST_SCORED_PX = 500
-COVERING_IOU = 0.5
+MIN_SCORED_PX = 500
+MIN_COVERING_IOU = 0.5
 
 ObjectOverlaps = Mapping[int, Mapping[str, tuple[int, dict[int, float]]]]
 """Frame -> true object -> (visible pixels, believed object's id -> IoU with it)."""
 
 
 def overlaps_of(
-    mission: Path, labels: Mapping[str, int], record: MissionRecorder
+    mission: Path, labels: Mapping[str, int], recorder: MissionRecorder
 ) -> ObjectOverlaps:
     """The overlap of recorded objects with the true masks of a mission, frame by frame.
 
@@ -32,28 +32,30 @@ def overlaps_of(
         SettingsError: A mask is missing or cannot be read.
     """
     return {
-        index: _overlaps_by_name(mission / "masks" / f"{index:05d}.png", labels, seen)
-        for index, seen in record.seen.items()
+        index: _overlaps_by_name(mission / "masks" / f"{index:05d}.png", labels, objects)
+        for index, objects in recorder.objects_by_frame.items()
     }
 
 
 def _overlaps_by_name(
-    path: Path, labels: Mapping[str, int], seen: Sequence[ObservedObject]
+    path: Path, labels: Mapping[str, int], objects: Sequence[ObservedObject]
 ) -> dict[str, tuple[int, dict[int, float]]]:
     mask = cv2.imread(opencv_name(path), cv2.IMREAD_UNCHANGED)
     if mask is None:
         raise SettingsError("a mask is missing or cannot be read", where=str(path))
-    return {name: _ious(mask == label, seen) for name, label in labels.items()}
+    return {name: _ious(mask == label, objects) for name, label in labels.items()}
 
 
-def _ious(true: np.ndarray, seen: Sequence[ObservedObject]) -> tuple[int, dict[int, float]]:
-    visible = int(true.sum())
+def _ious(true_mask: np.ndarray, objects: Sequence[ObservedObject]) -> tuple[int, dict[int, float]]:
+    visible = int(true_mask.sum())
     ious = {}
-    for it in seen:
-        x, y, w, h = it.region.bbox
-        both = int((true[y : y + h, x : x + w] & it.region.mask).sum())
-        if both:
-            ious[it.id] = both / (visible + int(it.region.mask.sum()) - both)
+    for observed in objects:
+        x, y, w, h = observed.region.bbox
+        intersection = int((true_mask[y : y + h, x : x + w] & observed.region.mask).sum())
+        if intersection:
+            ious[observed.id] = intersection / (
+                visible + int(observed.region.mask.sum()) - intersection
+            )
     return visible, ious
 
 
@@ -72,41 +74,49 @@ def true_names(overlaps: ObjectOverlaps) -> dict[int, str]:
 
 
 def identity_counts(
-    truths: MissionTruth, record: MissionRecorder, overlaps: ObjectOverlaps
+    truths: MissionTruth, recorder: MissionRecorder, overlaps: ObjectOverlaps
 ) -> tuple[int, int]:
     """Number of scored object-frames with the correct first candidate, and of all scored ones."""
-    entered = {
+    entry_times = {
         name: min(
             (e.time for e in truths.events if e.kind == "entry" and name in e.objects), default=0.0
         )
         for name in truths.names
     }
-    times = {index: sample.time for index, sample in zip(record.seen, record.stages, strict=True)}
-    right = scored = 0
+    times = {
+        index: sample.time
+        for index, sample in zip(recorder.objects_by_frame, recorder.stages, strict=True)
+    }
+    correct = scored = 0
     for index, objects in overlaps.items():
-        believed = {it.id: it.name for it in record.seen[index]}
+        believed = {observed.id: observed.name for observed in recorder.objects_by_frame[index]}
         for name, (visible, ious) in objects.items():
-            late = name in entered and times[index] >= entered[name] + UNSCORED_START_S
-            if visible < SMALLEST_SCORED_PX or not late:
+            entry_is_past = (
+                name in entry_times and times[index] >= entry_times[name] + UNSCORED_START_S
+            )
+            if visible < MIN_SCORED_PX or not entry_is_past:
                 continue
             scored += 1
             number = max(ious, key=lambda i: ious[i], default=None)
-            if number is not None and ious[number] >= COVERING_IOU:
-                right += believed[number] == truths.names[name]
-    return right, scored
+            if number is not None and ious[number] >= MIN_COVERING_IOU:
+                correct += believed[number] == truths.names[name]
+    return correct, scored
 
 
 def reported_poses(
-    truths: MissionTruth, record: MissionRecorder, overlaps: ObjectOverlaps
+    truths: MissionTruth, recorder: MissionRecorder, overlaps: ObjectOverlaps
 ) -> Poses:
     """Reported poses of visible, correctly identified objects, by frame and object."""
-    found: dict[tuple[int, str], Pose] = {}
+    poses: dict[tuple[int, str], Pose] = {}
     for index, objects in overlaps.items():
         for name, (visible, ious) in objects.items():
             number = max(ious, key=lambda i: ious[i], default=None)
-            if visible < SMALLEST_SCORED_PX or number is None:
+            if visible < MIN_SCORED_PX or number is None:
                 continue
-            it = next(s for s in record.seen[index] if s.id == number)
-            if it.pose is not None and it.name == it.pose.name == truths.names.get(name):
-                found[index, name] = it.pose
-    return found
+            observed = next(o for o in recorder.objects_by_frame[index] if o.id == number)
+            if (
+                observed.pose is not None
+                and observed.name == observed.pose.name == truths.names.get(name)
+            ):
+                poses[index, name] = observed.pose
+    return poses

@@ -12,7 +12,7 @@ from visup.agent import Pose
 Poses = Mapping[tuple[int, str], Pose]
 """(frame, true object) -> reported pose."""
 
-SPIN_HALF_S = 0.5
+SPIN_HALF_WINDOW_S = 0.5
 """The true rotation rate at a frame is measured over this time before and after, seconds."""
 
 
@@ -63,8 +63,8 @@ def true_spin(truth: Mapping[str, Any], index: int, name: str) -> float | None:
     from scipy.spatial.transform import Rotation
 
     frames = truth["frames"]
-    reach = round(SPIN_HALF_S * float(truth["fps"]))
-    first, last = max(0, index - reach), min(len(frames) - 1, index + reach)
+    half_window = round(SPIN_HALF_WINDOW_S * float(truth["fps"]))
+    first, last = max(0, index - half_window), min(len(frames) - 1, index + half_window)
     ends = [frames[k].get(name, {}).get("quat_xyzw") for k in (first, last)]
     if None in ends or first == last:
         return None

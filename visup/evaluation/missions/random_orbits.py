@@ -1,6 +1,6 @@
 """`visup eval orbits`: random missions in orbit are rendered, supervised, scored and discarded.
 
-The models are all generated meshes except those of `HIDDEN`, which are correctly identified as unknown. The
+The models are all generated meshes except those of `UNKNOWN_MESHES`, which are correctly identified as unknown. The
 arm is known by silhouettes from missions that are not scored.
 """
 
@@ -20,14 +20,14 @@ from visup.evaluation.figures import Progress, silent
 from visup.evaluation.missions.runner import evaluate_missions, mission_total
 from visup.evaluation.workers import each_in_processes
 
-SEEDS_APART = 10_000
+SEED_STRIDE = 10_000
 """Distance between the mission seeds of two evaluation seeds."""
 
-SCENERY = ("sill", "slab", "payload_bay")
+SCENERY_MESHES = ("sill", "slab", "payload_bay")
 """Meshes that are never identified."""
 
 _ARM_SEEDS = range(9_000_000, 9_000_024)
-_ARM_EVERY = 25
+_ARM_FRAME_STEP = 25
 _ARM_EXEMPLARS = 32
 
 
@@ -56,7 +56,7 @@ def evaluate_orbits(
     Raises:
         ExtraMissingError: The renderer is not installed.
     """
-    seeds = [seed * SEEDS_APART + k for k in range(count)]
+    seeds = [seed * SEED_STRIDE + k for k in range(count)]
     items: dict[str, dict[str, Any]] = {}
     with tempfile.TemporaryDirectory() as scratch:
         progress("building a database")
@@ -79,7 +79,7 @@ def orbit_models(folder: Path, jobs: int = 1) -> Path:
     from visup.render.meshes.spacecraft import MESHES, write_meshes
     from visup.render.orbits.unexpected_objects import UNKNOWN_MESHES
 
-    files = write_meshes(sorted(set(MESHES) - {*UNKNOWN_MESHES, *SCENERY}), folder)
+    files = write_meshes(sorted(set(MESHES) - {*UNKNOWN_MESHES, *SCENERY_MESHES}), folder)
     path = folder / "orbit.models"
     build_database(path, files, {"arm": _arm_masks()}, clusters=_ARM_EXEMPLARS, jobs=jobs)
     return path
@@ -93,21 +93,23 @@ def _arm_masks() -> list[NDArray[np.bool_]]:
     masks = []
     for seed in _ARM_SEEDS:
         renderer = Renderer(random_orbit(seed, "ok", (320, 240)))
-        every = range(0, renderer.scenario.frame_count, _ARM_EVERY)
-        masks += [renderer.mask(k) == ARM for k in every]
+        frames = range(0, renderer.scenario.frame_count, _ARM_FRAME_STEP)
+        masks += [renderer.mask(frame) == ARM for frame in frames]
     return masks
 
 
 def _scored(
-    seeds: Sequence[int], models: Path, how: tuple[int, int | None], workers: int | None
+    seeds: Sequence[int], models: Path, width_and_limit: tuple[int, int | None], workers: int | None
 ) -> Iterator[tuple[str, dict[str, Any]]]:
     """Names and figures of missions in order of completion."""
-    work = partial(score, models=models, width=how[0], limit=how[1])
-    for _, found in each_in_processes(work, seeds, workers or os.cpu_count() or 1):
-        yield found
+    score = partial(
+        score_mission, models=models, width=width_and_limit[0], limit=width_and_limit[1]
+    )
+    for _, result in each_in_processes(score, seeds, workers or os.cpu_count() or 1):
+        yield result
 
 
-def score(
+def score_mission(
     seed: int, models: Path, width: int = 480, limit: int | None = None
 ) -> tuple[str, dict[str, Any]]:
     """Render one mission, supervise it, and discard it.
@@ -129,5 +131,5 @@ def score(
         folder = Path(scratch) / scenario.name
         write_mission(scenario, folder)
         figures = evaluate_missions(folder, models=models, limit=limit)
-    told: dict[str, Any] = figures["items"][scenario.name]
-    return scenario.name, told | {"verdict_true": scenario.truth.verdict}
+    scores: dict[str, Any] = figures["items"][scenario.name]
+    return scenario.name, scores | {"verdict_true": scenario.truth.verdict}

@@ -23,7 +23,7 @@ class ObservedObject:
 class MissionRecorder:
     """The reports of the supervisor for one mission."""
 
-    seen: dict[int, tuple[ObservedObject, ...]] = field(default_factory=dict)
+    objects_by_frame: dict[int, tuple[ObservedObject, ...]] = field(default_factory=dict)
     events: list[tuple[str, tuple[int, ...], float]] = field(default_factory=list)
     alerts: list[tuple[str, tuple[int, ...], float, bool]] = field(default_factory=list)
     stages: list[StageSample] = field(default_factory=list)
@@ -32,7 +32,7 @@ class MissionRecorder:
 
     def __call__(self, step: Step, frame: Frame) -> None:
         """Add one step; an observer."""
-        self.seen[step.frame_index] = tuple(
+        self.objects_by_frame[step.frame_index] = tuple(
             ObservedObject(b.id, b.name, b.region, b.pose)
             for b in step.mind.objects.values()
             if b.last_seen == step.time

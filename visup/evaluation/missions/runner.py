@@ -76,66 +76,66 @@ def mission_database(
     """A model database from the meshes and silhouettes next to the missions."""
     from visup.percepts.shape.building.database_builder import build_database, read_silhouettes
 
-    beside = missions[0].resolve().parent.parent
-    meshes = sorted((beside / "models").glob("*.ply"))
+    data_folder = missions[0].resolve().parent.parent
+    meshes = sorted((data_folder / "models").glob("*.ply"))
     if not meshes:
         raise SettingsError(
             "there is no model database, and no ../models/*.ply to build one from",
             where=str(folder),
             hint="give one with --models DB",
         )
-    told = [read_json(mission / "mission.json") for mission in missions]
-    wanted = {m for t in told for m in t["actors"].values()}
+    descriptions = [read_json(mission / "mission.json") for mission in missions]
+    models = {model for description in descriptions for model in description["actors"].values()}
     progress(f"building a database from {len(meshes)} meshes")
     path = scratch / "models.db"
     silhouettes = {
-        name: read_silhouettes(beside / "shapes" / name)
-        for name in sorted(wanted)
-        if (beside / "shapes" / name).is_dir()
+        name: read_silhouettes(data_folder / "shapes" / name)
+        for name in sorted(models)
+        if (data_folder / "shapes" / name).is_dir()
     }
     build_database(path, meshes, silhouettes)
     return path
 
 
 def _evaluate(mission: Path, database: Path, limit: int | None) -> dict[str, Any]:
-    record = _supervise(mission, database, limit)
-    truth = read_json(mission / "truth.json")
-    truths = parse_truth(truth, float(truth["fps"]))
-    overlaps = overlaps_of(mission, truth["labels"], record)
-    return _scores(truth, truths, record, overlaps)
+    recorder = _supervise(mission, database, limit)
+    document = read_json(mission / "truth.json")
+    truth = parse_truth(document, float(document["fps"]))
+    overlaps = overlaps_of(mission, document["labels"], recorder)
+    return _scores(document, truth, recorder, overlaps)
 
 
 def mission_settings(mission: Path, database: Path) -> WatchSettings:
     """The settings of a mission from its `mission.json`."""
-    told = read_json(mission / "mission.json")
+    description = read_json(mission / "mission.json")
     return WatchSettings(
         source=str(mission / "video.mp4"),
-        tasks=(str(told["task"]),),
+        tasks=(str(description["task"]),),
         models=database,
-        actors={a: (m,) for a, m in told["actors"].items()},
-        fov_vertical_deg=told.get("fov_vertical_deg"),
+        actors={a: (m,) for a, m in description["actors"].items()},
+        fov_vertical_deg=description.get("fov_vertical_deg"),
     )
 
 
 def _supervise(mission: Path, database: Path, limit: int | None) -> MissionRecorder:
     settings = mission_settings(mission, database)
-    record = MissionRecorder()
-    agent = build_agent(settings, observers=(record,))
+    recorder = MissionRecorder()
+    agent = build_agent(settings, observers=(recorder,))
     begin = time.perf_counter()
     with open_video(settings) as source:
         agent.run(source, until=lambda s: limit is not None and s.frame_index + 1 >= limit)
-    record.seconds = time.perf_counter() - begin
-    return record
+    recorder.seconds = time.perf_counter() - begin
+    return recorder
 
 
 def report_scores(
-    truths: MissionTruth, record: MissionRecorder, names: Mapping[int, str]
+    truth: MissionTruth, recorder: MissionRecorder, names: Mapping[int, str]
 ) -> dict[str, Any]:
     """Figures of events, stages, alerts and verdict.
 
     Args:
-        truths: The truth.
-        record: The reports.
+        truth: The truth.
+        recorder: The reports.
         names: Id of a believed object -> true object.
 
     Returns:
@@ -145,56 +145,59 @@ def report_scores(
     def true_objects(ids: Sequence[int]) -> frozenset[str]:
         return frozenset(names.get(i, "?") for i in ids)
 
-    events = [ReportedEvent(kind, true_objects(ids), t) for kind, ids, t in record.events]
+    events = [ReportedEvent(kind, true_objects(ids), t) for kind, ids, t in recorder.events]
     alerts = [
-        ReportedEvent(kind, true_objects(ids), t, grave) for kind, ids, t, grave in record.alerts
+        ReportedEvent(kind, true_objects(ids), t, severe)
+        for kind, ids, t, severe in recorder.alerts
     ]
-    right, excess, missed = matched_events(events, truths.events)
-    precision, recall, f1 = precision_recall_f1(right, excess, missed)
-    found, false = scored_alerts(alerts, truths.alerts)
-    hours = max(record.last.time, 1.0) / 3600 if record.last else 1.0
-    verdict = final_verdict(record.last).value if record.last else Verdict.UNKNOWN.value
+    true_positives, false_positives, false_negatives = matched_events(events, truth.events)
+    precision, recall, f1 = precision_recall_f1(true_positives, false_positives, false_negatives)
+    found, false_alerts = scored_alerts(alerts, truth.alerts)
+    hours = max(recorder.last.time, 1.0) / 3600 if recorder.last else 1.0
+    verdict = final_verdict(recorder.last).value if recorder.last else Verdict.UNKNOWN.value
     return {
         "event_precision": precision,
         "event_recall": recall,
         "event_f1": f1,
-        "event_counts": [right, excess, missed],
-        "stage": stage_share(record.stages, truths),
-        "failing_latency_s": failing_latency(record.stages, truths),
+        "event_counts": [true_positives, false_positives, false_negatives],
+        "stage": stage_share(recorder.stages, truth),
+        "failing_latency_s": failing_latency(recorder.stages, truth),
         "alerts_found": found,
-        "alerts_expected": len(truths.alerts),
-        "false_alerts": false,
-        "false_alerts_per_hour": false / hours,
+        "alerts_expected": len(truth.alerts),
+        "false_alerts": false_alerts,
+        "false_alerts_per_hour": false_alerts / hours,
         "hours": hours,
         "verdict": verdict,
-        "verdicts_right": int(verdict == truths.verdict),
+        "verdicts_right": int(verdict == truth.verdict),
         "verdicts": 1,
     }
 
 
 def _scores(
-    truth: Mapping[str, Any],
-    truths: MissionTruth,
-    record: MissionRecorder,
+    document: Mapping[str, Any],
+    truth: MissionTruth,
+    recorder: MissionRecorder,
     overlaps: ObjectOverlaps,
 ) -> dict[str, Any]:
-    identified, scored = identity_counts(truths, record, overlaps)
-    poses = reported_poses(truths, record, overlaps)
+    identified, scored = identity_counts(truth, recorder, overlaps)
+    poses = reported_poses(truth, recorder, overlaps)
     scores: dict[str, Any] = {
         "identity": identified / scored if scored else None,
         "identity_counts": [identified, scored],
-        **report_scores(truths, record, true_names(overlaps)),
-        "view_deg": view_error(truth, poses),
-        "spin_error": spin_error(truth, poses),
-        "fps": len(record.seen) / record.seconds if record.seconds else None,
+        **report_scores(truth, recorder, true_names(overlaps)),
+        "view_deg": view_error(document, poses),
+        "spin_error": spin_error(document, poses),
+        "fps": len(recorder.objects_by_frame) / recorder.seconds if recorder.seconds else None,
     }
     return {k: v for k, v in scores.items() if v is not None}
 
 
 def mission_total(items: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Figures over all missions from summed counts, so that each frame and event has equal weight."""
-    right, excess, missed = (sum(i["event_counts"][k] for i in items) for k in range(3))
-    precision, recall, f1 = precision_recall_f1(right, excess, missed)
+    true_positives, false_positives, false_negatives = (
+        sum(i["event_counts"][k] for i in items) for k in range(3)
+    )
+    precision, recall, f1 = precision_recall_f1(true_positives, false_positives, false_negatives)
     identified, scored = (sum(i["identity_counts"][k] for i in items) for k in range(2))
     hours = sum(i["hours"] for i in items)
     total: dict[str, Any] = {

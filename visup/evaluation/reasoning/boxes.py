@@ -75,8 +75,8 @@ class Boxes:
         time: Seconds of the last frame.
         times: Seconds of the samples.
         samples: One row each: gaps of the P pairs, then x and y of the M centres, pixels.
-        smooth: (M, 4) the smoothed boxes, from which states are derived.
-        latch: (JUDGED + 1, P) states; the last row is the approach.
+        smoothed: (M, 4) the smoothed boxes, from which states are derived.
+        hysteresis: (JUDGED + 1, P) states; the last row is the approach.
         gap: (P,) pixels, negative the depth of overlap.
         rate: (P,) approach rate: trend of the gap, pixels per second, negative when closing.
         rate_sigma: (P,) its standard deviation.
@@ -87,8 +87,10 @@ class Boxes:
     time: float = 0.0
     times: tuple[float, ...] = ()
     samples: tuple[Floats, ...] = ()
-    smooth: Floats = field(default_factory=lambda: np.zeros((0, 4)))
-    latch: HysteresisState = field(default_factory=lambda: unknown_states((BOX_ROWS + 1, 0), 0.0))
+    smoothed: Floats = field(default_factory=lambda: np.zeros((0, 4)))
+    hysteresis: HysteresisState = field(
+        default_factory=lambda: unknown_states((BOX_ROWS + 1, 0), 0.0)
+    )
     gap: Floats = field(default_factory=lambda: np.zeros(0))
     rate: Floats = field(default_factory=lambda: np.zeros(0))
     rate_sigma: Floats = field(default_factory=lambda: np.zeros(0))
@@ -97,36 +99,36 @@ class Boxes:
     @property
     def rcc8(self) -> Codes:
         """(P,) codes into `RCC8`."""
-        return from_signs(self.latch.state[ORDER])
+        return from_signs(self.hysteresis.state[ORDER])
 
     def rcc8_of(self, a: int, b: int) -> str | None:
         """The RCC-8 relation of a to b, or None while unknown."""
-        k, turned = self._pair(a, b)
+        k, swapped = self._pair(a, b)
         code = int(self.rcc8[k])
-        return _name(RCC8, CONVERSE[code] if turned else code)
+        return _name(RCC8, CONVERSE[code] if swapped else code)
 
     def qtc_of(self, a: int, b: int, *, sides: bool = False) -> str | None:
         """QTC-B of the pair, such as '-0', or QTC-C with `sides`, such as '-0+0'."""
-        k, turned = self._pair(a, b)
-        order = slice(None, None, -1) if turned else slice(None)
-        codes = [int(c) for c in self.latch.state[AWAY, k][order]]
+        k, swapped = self._pair(a, b)
+        order = slice(None, None, -1) if swapped else slice(None)
+        codes = [int(c) for c in self.hysteresis.state[AWAY, k][order]]
         if sides:
-            codes += [int(c) for c in self.latch.state[SIDE, k][order]]
+            codes += [int(c) for c in self.hysteresis.state[SIDE, k][order]]
         return text(*codes)
 
     def direction_of(self, a: int, b: int) -> str | None:
         """The direction of a as seen from b, or None while unknown."""
-        k, turned = self._pair(a, b)
-        code = int(self.latch.state[DIRECTION, k])
-        return _name(DIRECTION_NAMES, DIRECTION_CONVERSE[code] if turned else code)
+        k, swapped = self._pair(a, b)
+        code = int(self.hysteresis.state[DIRECTION, k])
+        return _name(DIRECTION_NAMES, DIRECTION_CONVERSE[code] if swapped else code)
 
     def distance_of(self, a: int, b: int) -> str | None:
         """Class of the distance, or None while unknown."""
-        return _name(CLASS_NAMES, self.latch.state[DISTANCE, self._pair(a, b)[0]])
+        return _name(CLASS_NAMES, self.hysteresis.state[DISTANCE, self._pair(a, b)[0]])
 
     def approach_of(self, a: int, b: int) -> str | None:
         """Whether the two converge, keep their distance or diverge, or None while unknown."""
-        return _name(APPROACH_NAMES, self.latch.state[APPROACH, self._pair(a, b)[0]])
+        return _name(APPROACH_NAMES, self.hysteresis.state[APPROACH, self._pair(a, b)[0]])
 
     def _pair(self, a: int, b: int) -> tuple[int, bool]:
         i, j = self.ids.index(a), self.ids.index(b)
@@ -154,45 +156,47 @@ def watch_boxes(
         The new beliefs.
     """
     s = settings or DEFAULT
-    kept = before if ids == before.ids else _other(before, ids, now)
+    beliefs = before if ids == before.ids else _realigned(before, ids, now)
     m, p = len(ids), len(pairs(len(ids))[0])
     boxes = np.ascontiguousarray(boxes, dtype=float)
     gap = box_gaps(boxes)
-    smooth = exponential_mean(kept.smooth, boxes, now - kept.time, 6.0 * s.thresholds.noise_px)
-    places = boxes[:, :2] + 0.5 * boxes[:, 2:]
-    times, samples = _window(kept, np.concatenate([gap, places.T.ravel()]), now, s)
+    smoothed = exponential_mean(
+        beliefs.smoothed, boxes, now - beliefs.time, 6.0 * s.thresholds.noise_px
+    )
+    centres = boxes[:, :2] + 0.5 * boxes[:, 2:]
+    times, samples = _window(beliefs, np.concatenate([gap, centres.T.ravel()]), now, s)
     seconds = np.array(times)
     slope, sigma = _fit(seconds, np.stack(samples), s)
     # Deviation of a trend due to edge noise, for one coordinate and for a gap between two edges.
     noise = slope_noise(seconds, s.thresholds.noise_px)
     velocity = slope[p:].reshape(2, m).T.copy()
     spread = np.maximum(noise, s.fit_share * sigma[p:].reshape(2, m).max(axis=0))
-    judge, state = s.thresholds, kept.latch.state
-    bounds = limits(judge, s.diagonal)
+    thresholds, state = s.thresholds, beliefs.hysteresis.state
+    bounds = limits(thresholds, s.diagonal)
     codes = np.empty((BOX_ROWS + 1, p), dtype=np.int8)
-    classify_boxes(state, smooth, velocity, spread, bounds, codes)
+    classify_boxes(state, smoothed, velocity, spread, bounds, codes)
     rate, rate_sigma = slope[:p], np.maximum(np.sqrt(2.0) * noise, s.fit_share * sigma[:p])
     codes[APPROACH] = moving_signs(rate, rate_sigma, state[APPROACH], bounds[-4:])
-    latch = advance(kept.latch, codes, now, _lasts(judge))
-    return Boxes(ids, now, times, samples, smooth, latch, gap, rate, rate_sigma, velocity)
+    hysteresis = advance(beliefs.hysteresis, codes, now, _minimum_durations(thresholds))
+    return Boxes(ids, now, times, samples, smoothed, hysteresis, gap, rate, rate_sigma, velocity)
 
 
 DEFAULT = BoxSettings()
 
 
 @lru_cache(maxsize=8)
-def _lasts(judge: ThresholdSettings) -> Floats:
-    return np.append(least_durations(judge), [[judge.motion_minimum_s]], axis=0)
+def _minimum_durations(thresholds: ThresholdSettings) -> Floats:
+    return np.append(least_durations(thresholds), [[thresholds.motion_minimum_s]], axis=0)
 
 
 def _window(
-    kept: Boxes, row: Floats, now: float, s: BoxSettings
+    beliefs: Boxes, row: Floats, now: float, s: BoxSettings
 ) -> tuple[tuple[float, ...], tuple[Floats, ...]]:
     """Samples of the window including this one; samples that follow too closely are skipped."""
     begin = next(
-        (k for k, t in enumerate(kept.times) if t > now - s.window_s - 1e-6), len(kept.times)
+        (k for k, t in enumerate(beliefs.times) if t > now - s.window_s - 1e-6), len(beliefs.times)
     )
-    times, samples = kept.times[begin:], kept.samples[begin:]
+    times, samples = beliefs.times[begin:], beliefs.samples[begin:]
     if times and now - times[-1] < s.window_s / s.samples - 1e-6:
         return times, samples
     return (*times, now), (*samples, row)
@@ -206,17 +210,19 @@ def _fit(times: Floats, samples: Floats, s: BoxSettings) -> tuple[Floats, Floats
     return binned_trends(times, samples, s.bins)
 
 
-def _other(before: Boxes, ids: tuple[int, ...], now: float) -> Boxes:
+def _realigned(before: Boxes, ids: tuple[int, ...], now: float) -> Boxes:
     """The beliefs realigned to other objects; new ones have no samples and no states."""
     rows, numbers = reindexing(before.ids, ids)
     p, m = len(before.gap), len(before.ids)
-    at = np.concatenate(
+    columns = np.concatenate(
         [numbers, np.where(rows < 0, -1, p + rows), np.where(rows < 0, -1, p + m + rows)]
     )
-    samples = tuple(np.where(at < 0, np.nan, np.append(row, np.nan)[at]) for row in before.samples)
-    smooth = np.append(before.smooth, np.full((1, 4), np.nan), axis=0)[rows]
-    latch = before.latch.select(numbers, now)
-    return Boxes(ids, before.time, before.times, samples, smooth, latch)
+    samples = tuple(
+        np.where(columns < 0, np.nan, np.append(row, np.nan)[columns]) for row in before.samples
+    )
+    smoothed = np.append(before.smoothed, np.full((1, 4), np.nan), axis=0)[rows]
+    hysteresis = before.hysteresis.select(numbers, now)
+    return Boxes(ids, before.time, before.times, samples, smoothed, hysteresis)
 
 
 def _name(names: tuple[str, ...], code: int) -> str | None:

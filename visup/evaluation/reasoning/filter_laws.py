@@ -27,15 +27,15 @@ from visup.tasks.verification.step_model import Observe
 recognition_tasks = oracle("recognition_tasks")
 unmerged_filter = oracle("unmerged_filter").unmerged_filter
 
-BOUND = 0.01
+MAX_DIFFERENCE = 0.01
 """Maximum difference of stage probabilities from the reference on observations of a mission."""
-DRAWN_BOUND = 0.05
+MAX_MEAN_DIFFERENCE = 0.05
 """Maximum mean difference for random grammars with random observations."""
 STEPS = 40
 FRAME_S = 0.2
-SPELL_S = (0.4, 4.0)  # range of the duration of one observed status of an action
+STATUS_DURATION_S = (0.4, 4.0)  # range of the time for which an action keeps one observed status
 
-Recorded = Sequence[tuple[float, Observe]]
+Observations = Sequence[tuple[float, Observe]]
 """Times in seconds, and observations of steps."""
 
 
@@ -54,30 +54,36 @@ class FilterDistance:
     lost: float = 0.0
 
 
-def distance_to_certified(model: MonitoredPhases, recorded: Recorded) -> FilterDistance:
+def distance_to_reference(model: MonitoredPhases, observations: Observations) -> FilterDistance:
     """The distance of supervision from the reference posterior.
 
     Args:
         model: The supervised task.
-        recorded: Times and observations, the first where the task begins.
+        observations: Times and observations, the first where the task begins.
     """
-    certified: TaskFilter[int, TaskHypothesis, Observe] = unmerged_filter(model)
-    told = model.filter.start(recorded[0][0])
-    true = certified.start(told.time)
+    reference: TaskFilter[int, TaskHypothesis, Observe] = unmerged_filter(model)
+    state = model.filter.start(observations[0][0])
+    reference_state = reference.start(state.time)
     differences = []
-    for now, observe in recorded:
-        told = model.filter.step(told, observe, now - told.time, now)
-        true = certified.step(true, observe, now - true.time, now)
-        differences.append(_apart(dict(model.filter.ranking(told)), dict(certified.ranking(true))))
-    return FilterDistance(max(differences), sum(differences) / len(differences), true.lost)
+    for now, observe in observations:
+        state = model.filter.step(state, observe, now - state.time, now)
+        reference_state = reference.step(reference_state, observe, now - reference_state.time, now)
+        differences.append(
+            _max_difference(
+                dict(model.filter.ranking(state)), dict(reference.ranking(reference_state))
+            )
+        )
+    return FilterDistance(
+        max(differences), sum(differences) / len(differences), reference_state.lost
+    )
 
 
-def _apart(one: Mapping[str, float], other: Mapping[str, float]) -> float:
+def _max_difference(one: Mapping[str, float], other: Mapping[str, float]) -> float:
     """The greatest difference of stage probabilities, including the end."""
     return max(abs(one.get(k, 0.0) - other.get(k, 0.0)) for k in {*one, *other})
 
 
-def drawn_distance(seed: int, steps: int = STEPS) -> FilterDistance:
+def random_grammar_distance(seed: int, steps: int = STEPS) -> FilterDistance:
     """The distance of supervision from the reference on a random grammar with random observations.
 
     Args:
@@ -88,29 +94,29 @@ def drawn_distance(seed: int, steps: int = STEPS) -> FilterDistance:
     task = read(recognition_tasks.text_of(recognition_tasks.Draw(rng).rules()))
     keys = recognition_tasks.KEYS
     actions = {k: ActionDefinition(k, (k,), contrary=(f"not {k}",), text=k) for k in keys}
-    spells = {k: drawn_spells(rng) for k in keys}
+    statuses = {k: random_statuses(rng) for k in keys}
     times = [FRAME_S * i for i in range(steps)]
-    recorded = [(now, _seen_at(now, spells)) for now in times]
-    return distance_to_certified(MonitoredPhases(task, actions, DEFAULT_SETTINGS), recorded)
+    observations = [(now, _observe_at(now, statuses)) for now in times]
+    return distance_to_reference(MonitoredPhases(task, actions, DEFAULT_SETTINGS), observations)
 
 
-Spells = Sequence[tuple[float, ActionStatus]]
+StatusIntervals = Sequence[tuple[float, ActionStatus]]
 """Start times of the observed statuses of an action, seconds."""
 
 
-def drawn_spells(rng: random.Random) -> Spells:
+def random_statuses(rng: random.Random) -> StatusIntervals:
     """A random sequence of observed statuses of an action."""
-    found, now = [], 0.0
+    intervals, now = [], 0.0
     while now < FRAME_S * STEPS:
-        found.append((now, rng.choice(tuple(ActionStatus))))
-        now += rng.uniform(*SPELL_S)
-    return found
+        intervals.append((now, rng.choice(tuple(ActionStatus))))
+        now += rng.uniform(*STATUS_DURATION_S)
+    return intervals
 
 
-def _seen_at(now: float, spells: Mapping[str, Spells]) -> Observe:
+def _observe_at(now: float, statuses: Mapping[str, StatusIntervals]) -> Observe:
     @cache  # hundreds of hypotheses ask for the same few actions
-    def seen(action: str) -> ActionObservation:
-        since, status = max(s for s in spells[action] if s[0] <= now)
+    def observed(action: str) -> ActionObservation:
+        since, status = max(s for s in statuses[action] if s[0] <= now)
         relation = Relation(action, (1,), Truth.TRUE, since)
         holds = relation if status is ActionStatus.HOLDS else None
         return ActionObservation(
@@ -122,4 +128,4 @@ def _seen_at(now: float, spells: Mapping[str, Spells]) -> Observe:
             observed=status is not ActionStatus.UNKNOWN,
         )
 
-    return lambda step: seen(step.action)
+    return lambda step: observed(step.action)

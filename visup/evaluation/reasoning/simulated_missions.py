@@ -20,7 +20,7 @@ from visup.agent.model.step import Step
 from visup.evaluation.calibration import Calibration
 from visup.evaluation.figures import Progress, silent
 from visup.evaluation.missions.files import mission_folders
-from visup.evaluation.missions.overlaps import COVERING_IOU, SMALLEST_SCORED_PX
+from visup.evaluation.missions.overlaps import MIN_COVERING_IOU, MIN_SCORED_PX
 from visup.evaluation.missions.pose_errors import true_spin
 from visup.evaluation.missions.recorder import MissionRecorder
 from visup.evaluation.missions.runner import mission_total, report_scores
@@ -32,7 +32,7 @@ from visup.rules.reasoners import default_reasoners
 from visup.tasks import load_task
 from visup.tasks.supervision.supervise import task_reasoner
 
-SPIN_SPAN_S = 5.0
+SPIN_WINDOW_S = 5.0
 """Rotation is scored over this time at the end of a mission, seconds."""
 
 
@@ -43,56 +43,56 @@ class BeliefScorer:
     Attributes:
         mission: The mission with its truth.
         truths: The parsed truth.
-        who: Region id -> names of true objects.
-        said: Recorded events, alerts, stages.
-        right: Number of object-frames with the correct name.
+        true_names: Region id -> names of true objects.
+        recorder: Recorded events, alerts, stages.
+        correct: Number of object-frames with the correct name.
         scored: Number of all scored object-frames.
         calibration: Confidences with correctness.
-        shows: (object, true name) -> frames in which its region showed that.
+        overlap_frames: (object, true name) -> frames in which its region showed that.
         spins: (time, degrees per second) believed for each true object.
-        wrong: Frames with a wrong name: (time, object, belief).
+        misidentified: Frames with a wrong name: (time, object, belief).
     """
 
     mission: Mission
     truths: MissionTruth
-    who: Mapping[int, tuple[str, ...]]
-    said: MissionRecorder = field(default_factory=MissionRecorder)
-    right: int = 0
+    true_names: Mapping[int, tuple[str, ...]]
+    recorder: MissionRecorder = field(default_factory=MissionRecorder)
+    correct: int = 0
     scored: int = 0
     calibration: Calibration = field(default_factory=Calibration)
-    shows: dict[tuple[int, str], int] = field(default_factory=dict)
+    overlap_frames: dict[tuple[int, str], int] = field(default_factory=dict)
     spins: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
-    wrong: list[tuple[float, str, str]] = field(default_factory=list)
+    misidentified: list[tuple[float, str, str]] = field(default_factory=list)
 
     def __call__(self, step: Step, frame: Frame) -> None:
         """Add one step; an observer."""
-        self.said(step, frame)
+        self.recorder(step, frame)
         for known in step.mind.objects.values():
-            names = self.who.get(known.region.id, ())
+            names = self.true_names.get(known.region.id, ())
             if known.last_seen == step.time and len(names) == 1:
                 key = (known.id, names[0])
-                self.shows[key] = self.shows.get(key, 0) + 1
+                self.overlap_frames[key] = self.overlap_frames.get(key, 0) + 1
         for name, masks in self._scored(step):
             belief = covering(step.mind, masks)
-            said = "nobody" if belief is None else belief.name
-            together = {self.truths.names[n] for n in self._together(name, step.time)}
-            right = said in together
+            believed = "nobody" if belief is None else belief.name
+            accepted = {self.truths.names[n] for n in self._coupled_with(name, step.time)}
+            correct = believed in accepted
             self.scored += 1
-            self.right += right
-            if not right:
-                self.wrong.append((step.time, name, said))
+            self.correct += correct
+            if not correct:
+                self.misidentified.append((step.time, name, believed))
             if belief is not None:
-                self.calibration.add(belief.confidence, right)
+                self.calibration.add(belief.confidence, correct)
                 if belief.pose is not None and belief.pose.spin is not None:
                     spin = (step.time, belief.pose.spin.rate)
                     self.spins.setdefault(name, []).append(spin)
 
     def names(self) -> dict[int, str]:
         """Id of a believed object -> true object that it showed most often."""
-        ranked = sorted(self.shows.items(), key=lambda item: (item[1], item[0]))
+        ranked = sorted(self.overlap_frames.items(), key=lambda item: (item[1], item[0]))
         return {number: name for (number, name), _ in ranked}
 
-    def _together(self, name: str, time: float) -> frozenset[str]:
+    def _coupled_with(self, name: str, time: float) -> frozenset[str]:
         """The true objects coupled to this one now, including itself."""
         for event in self.truths.events:
             if event.kind == "coupled" and name in event.objects and time >= event.time:
@@ -101,15 +101,15 @@ class BeliefScorer:
 
     def _scored(self, step: Step) -> Iterator[tuple[str, list[list[TrueMask]]]]:
         """The scored objects of this frame, with the masks that may match them."""
-        here = self.mission.masks[step.frame_index]
-        for name, mask in here.items():
-            entered = [
+        masks = self.mission.masks[step.frame_index]
+        for name, mask in masks.items():
+            entry_times = [
                 e.time for e in self.truths.events if e.kind == "entry" and name in e.objects
             ]
-            late = bool(entered) and step.time >= min(entered) + UNSCORED_START_S
-            if mask.visible_px < SMALLEST_SCORED_PX or not late:
+            entry_is_past = bool(entry_times) and step.time >= min(entry_times) + UNSCORED_START_S
+            if mask.visible_px < MIN_SCORED_PX or not entry_is_past:
                 continue
-            union = [here[n] for n in sorted(self._together(name, step.time)) if n in here]
+            union = [masks[n] for n in sorted(self._coupled_with(name, step.time)) if n in masks]
             yield name, [[mask], union] if len(union) > 1 else [[mask]]
 
 
@@ -129,81 +129,84 @@ def covering(mind: Mind, masks: Sequence[Sequence[TrueMask]]) -> ObjectBelief | 
         if b.presence is not Presence.LEFT or b.last_seen == mind.time
     ]
     best = max(scored, default=None, key=lambda s: s[:2])
-    return best[2] if best is not None and best[0] >= COVERING_IOU else None
+    return best[2] if best is not None and best[0] >= MIN_COVERING_IOU else None
 
 
 def _iou(belief: ObjectBelief, parts: Sequence[TrueMask]) -> float:
     x, y, w, h = belief.region.bbox
-    both = 0
+    intersection = 0
     for true in parts:
         rows, columns = true.inside.shape
         left, top = max(x, true.at[0]), max(y, true.at[1])
         right, bottom = min(x + w, true.at[0] + columns), min(y + h, true.at[1] + rows)
         if left < right and top < bottom:
-            mine = belief.region.mask[top - y : bottom - y, left - x : right - x]
+            believed = belief.region.mask[top - y : bottom - y, left - x : right - x]
             at = true.at
-            theirs = true.inside[top - at[1] : bottom - at[1], left - at[0] : right - at[0]] > 0
-            both += int(np.count_nonzero(mine & theirs))
-    whole = sum(true.visible_px for true in parts)
-    return both / max(1.0, belief.region.area + whole - both)
+            inside = true.inside[top - at[1] : bottom - at[1], left - at[0] : right - at[0]] > 0
+            intersection += int(np.count_nonzero(believed & inside))
+    true_px = sum(true.visible_px for true in parts)
+    return intersection / max(1.0, belief.region.area + true_px - intersection)
 
 
 def watch_mission(mission: Mission, noise: PerceptNoise, *, every: int = 1) -> BeliefScorer:
     """Supervise one mission on simulated percepts."""
-    behaviours, who = behaviours_of(mission, noise)
-    watch = BeliefScorer(mission, parse_truth(mission.truth, mission.fps), who)
+    behaviours, true_names = behaviours_of(mission, noise)
+    scorer = BeliefScorer(mission, parse_truth(mission.truth, mission.fps), true_names)
     rules = default_reasoners()
     task = task_reasoner([load_task(str(mission.description["task"]))])
     agent = Agent(
         behaviours=behaviours,
         reasoners=Reasoners(rules.update, rules.cogitate, (task,)),
         actors={a: (m,) for a, m in mission.description["actors"].items()},
-        observers=(watch,),
+        observers=(scorer,),
     )
     agent.run(frames_of(mission, every=every))
-    return watch
+    return scorer
 
 
-def run_scores(watch: BeliefScorer) -> dict[str, Any]:
+def run_scores(scorer: BeliefScorer) -> dict[str, Any]:
     """Figures of one run."""
-    names = watch.names()
-    told = [(kind, ids) for kind, ids, _ in watch.said.events]
-    true = {(e.kind, e.objects) for e in watch.truths.events}
+    names = scorer.names()
+    reported = [(kind, ids) for kind, ids, _ in scorer.recorder.events]
+    true_events = {(e.kind, e.objects) for e in scorer.truths.events}
 
     def false(kind: str) -> int:
         return sum(
-            (k, frozenset(names.get(i, "?") for i in ids)) not in true
-            for k, ids in told
+            (k, frozenset(names.get(i, "?") for i in ids)) not in true_events
+            for k, ids in reported
             if k == kind
         )
 
     return {
-        "identity_counts": [watch.right, watch.scored],
-        "calibration": watch.calibration.counts(),
+        "identity_counts": [scorer.correct, scorer.scored],
+        "calibration": scorer.calibration.counts(),
         "false_coupled": false("coupled"),
         "false_exit": false("exit"),
-        "spin_errors": _spin_errors(watch),
-        **report_scores(watch.truths, watch.said, names),
+        "spin_errors": _spin_errors(scorer),
+        **report_scores(scorer.truths, scorer.recorder, names),
     }
 
 
-def _spin_errors(watch: BeliefScorer) -> list[float]:
+def _spin_errors(scorer: BeliefScorer) -> list[float]:
     """Relative errors of the satellite's believed rotation rate at the end of a mission.
 
     The reference is its true rotation then: a captured satellite turns with its carrier.
     """
-    end = watch.said.last.time if watch.said.last else 0.0
-    late = [(t, r) for t, r in watch.spins.get("satellite", []) if t > end - SPIN_SPAN_S]
-    rates = [(r, true_spin(watch.mission.truth, _index(watch, t), "satellite")) for t, r in late]
-    both = [(told, true) for told, true in rates if true is not None]
-    if not both:
+    end = scorer.recorder.last.time if scorer.recorder.last else 0.0
+    recent = [(t, r) for t, r in scorer.spins.get("satellite", []) if t > end - SPIN_WINDOW_S]
+    rates = [
+        (r, true_spin(scorer.mission.truth, _frame_index(scorer, t), "satellite"))
+        for t, r in recent
+    ]
+    pairs = [(reported, true) for reported, true in rates if true is not None]
+    if not pairs:
         return []
-    told, true = np.median(np.array(both), axis=0).tolist()
-    return [abs(told - true) / true] if true > 0 else []
+    reported, true = np.median(np.array(pairs), axis=0).tolist()
+    return [abs(reported - true) / true] if true > 0 else []
 
 
-def _index(watch: BeliefScorer, time: float) -> int:
-    return round(time * watch.mission.fps)
+def _frame_index(scorer: BeliefScorer, time: float) -> int:
+    return round(time * scorer.mission.fps)
 
 
 def evaluate_reasoning(
@@ -237,17 +240,22 @@ def evaluate_reasoning(
     noise = noise or PerceptNoise()
     run = partial(_mission, every=every, noise=noise)
     # Each run has its own random seed.
-    chances = [
+    seeds_by_mission = [
         [seed * len(missions) + k for seed in range(first, first + seeds)]
         for k in range(len(missions))
     ]
     runs: dict[str, list[dict[str, Any]]] = {}
     with worker_pool(jobs) as pool:
-        for mission, found in zip(missions, pool.map(run, missions, chances), strict=True):
-            runs[mission.name] = found
+        for mission, mission_runs in zip(
+            missions, pool.map(run, missions, seeds_by_mission), strict=True
+        ):
+            runs[mission.name] = mission_runs
             progress(mission.name)
-    items = {name: _summed(found) for name, found in runs.items()}
-    return {"total": _summed([r for found in runs.values() for r in found]), "items": items}
+    items = {name: _summed(mission_runs) for name, mission_runs in runs.items()}
+    return {
+        "total": _summed([r for mission_runs in runs.values() for r in mission_runs]),
+        "items": items,
+    }
 
 
 def _mission(

@@ -21,10 +21,10 @@ from visup.evaluation.figures import Progress, resident_mb, silent
 from visup.evaluation.runtime.scripted_observations import FPS, drifting_boxes
 from visup.rules.reasoners import default_reasoners
 
-SETTLED = 10_000
+SETTLED_FRAMES = 10_000
 """Frames after which memory must not grow."""
 
-KEPT = 10_000
+STORED_MINDS = 10_000
 """Number of stored minds to measure the size of one."""
 
 
@@ -43,35 +43,40 @@ def evaluate_endurance(
         `grown` (relative growth since frame 10,000 or the middle, whichever is earlier), and
         `snapshot_kb` per mind of 10,000 consecutive ones.
     """
-    settled = min(SETTLED, frames // 2)
-    at_rest, last = 0.0, Mind()
-    spent: list[float] = []
-    for k, (took, thought) in enumerate(_thought(3, frames, seed, Mind())):
-        last = thought
+    settled_frame = min(SETTLED_FRAMES, frames // 2)
+    settled_mb, last = 0.0, Mind()
+    step_seconds: list[float] = []
+    for k, (seconds, mind) in enumerate(_reasoning_steps(3, frames, seed, Mind())):
+        last = mind
         if k % 16 == 0:
-            spent.append(took)
-        if k == settled:
-            at_rest = resident_mb()
+            step_seconds.append(seconds)
+        if k == settled_frame:
+            settled_mb = resident_mb()
         if k % 5000 == 0:
             progress(f"{k} of {frames} frames")
     end = resident_mb()
-    ten = [took for took, _ in _thought(10, max(200, min(frames // 10, 2000)), seed, Mind())]
+    ten = [
+        seconds
+        for seconds, _ in _reasoning_steps(10, max(200, min(frames // 10, 2000)), seed, Mind())
+    ]
     before = resident_mb()
-    kept = [m for _, m in _thought(3, min(KEPT, frames), seed + 1, last)]
+    minds = [m for _, m in _reasoning_steps(3, min(STORED_MINDS, frames), seed + 1, last)]
     return {
         "total": {
             "frames": frames,
-            "ms": 1000 * float(np.median(spent)),
+            "ms": 1000 * float(np.median(step_seconds)),
             "ms_ten": 1000 * float(np.median(ten)),
             "rss_mb": end,
-            "grown": end / at_rest - 1.0,
-            "snapshot_kb": 1024 * (resident_mb() - before) / len(kept),
+            "grown": end / settled_mb - 1.0,
+            "snapshot_kb": 1024 * (resident_mb() - before) / len(minds),
         },
         "items": {},
     }
 
 
-def _thought(count: int, frames: int, seed: int, mind: Mind) -> Iterator[tuple[float, Mind]]:
+def _reasoning_steps(
+    count: int, frames: int, seed: int, mind: Mind
+) -> Iterator[tuple[float, Mind]]:
     """Seconds of each step, and the mind after it."""
     rules = default_reasoners()
     reasoners: tuple[Reasoner, ...] = (*rules.update, *rules.cogitate)
@@ -79,7 +84,10 @@ def _thought(count: int, frames: int, seed: int, mind: Mind) -> Iterator[tuple[f
     for seen in drifting_boxes(count, frames, seed, start):
         begin = time.perf_counter()
         mind = replace(
-            mind, time=seen.time, frame_index=seen.frame_index, frame_size=seen.frame_size
+            mind,
+            time=seen.time,
+            frame_index=seen.frame_index,
+            frame_size=seen.frame_size,
         )
         for reasoner in reasoners:
             mind = reasoner(mind, seen).mind

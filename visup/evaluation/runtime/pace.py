@@ -32,8 +32,8 @@ from visup.sinks import Sinks
 COUNTS = (3, 10)
 """Objects in the scripts."""
 TASKS = ("dock", "inspect")
-LEAST_STEPS = 300
-WARM = 100
+MIN_STEPS = 300
+WARM_UP_STEPS = 100
 """Warm-up steps that are not measured, while objects enter and windows fill."""
 
 RULES = """
@@ -94,53 +94,55 @@ def evaluate_pace(
     Raises:
         SettingsError: There are too few steps.
     """
-    if steps < LEAST_STEPS:
-        raise SettingsError(f"--steps is {steps}", expected=f"at least {LEAST_STEPS}")
+    if steps < MIN_STEPS:
+        raise SettingsError(f"--steps is {steps}", expected=f"at least {MIN_STEPS}")
     items: dict[str, dict[str, float]] = {}
     with tempfile.TemporaryDirectory() as scratch:
         settings = _settings(Path(scratch))
         for count in COUNTS:
             progress(f"{count} objects")
-            items[f"{count} objects"] = _stepped(
+            items[f"{count} objects"] = _step_costs(
                 settings, list(drifting_boxes(count, steps, count)), Path(scratch) / str(count)
             )
         progress("replay")
         fps = _replay_fps(Path(scratch) / str(COUNTS[0]))
         progress("observers")
-        share = _observers(settings, Path(scratch) / "alerts.jsonl")
+        share = _observer_share(settings, Path(scratch) / "alerts.jsonl")
     progress(f"{kept} minds")
     total = {"observers": share, "replay_fps": fps, "mind_kb": _mind_kb(kept)}
     return {"items": items, "total": total}
 
 
-def _settings(place: Path) -> WatchSettings:
-    rules = place / "twenty.rules"
+def _settings(folder: Path) -> WatchSettings:
+    rules = folder / "twenty.rules"
     shipped = files("visup.rules.safety").joinpath("safety.rules").read_text(encoding="utf-8")
     rules.write_text(shipped + RULES, encoding="utf-8")
     return WatchSettings("scripted", tasks=TASKS, rules=(rules,))
 
 
-def _stepped(settings: WatchSettings, seen: list[Observation], folder: Path) -> dict[str, float]:
+def _step_costs(
+    settings: WatchSettings, observations: list[Observation], folder: Path
+) -> dict[str, float]:
     """Cost of steps and of recording them; the journal is left in the folder."""
     folder.mkdir()
     journal = Journal(folder / JOURNAL)
     journal.note(settings=to_jsonable(settings))
     agent = reasoning_agent(settings)
-    thought, whole, alerts = [], [], []
-    for one in seen:
+    reasoning_s, step_s, alerts = [], [], []
+    for observation in observations:
         begin = time.process_time()
-        step = agent.reason(one)
-        thought.append(time.process_time() - begin)
+        step = agent.reason(observation)
+        reasoning_s.append(time.process_time() - begin)
         journal.record(step)
-        whole.append(time.process_time() - begin)
+        step_s.append(time.process_time() - begin)
         alerts.append(len(step.mind.alerts))
     journal.close()
-    ms = 1e3 * np.array(whole[WARM:])
+    ms = 1e3 * np.array(step_s[WARM_UP_STEPS:])
     return {
         "ms": float(np.median(ms)),
         "ms_low": float(np.percentile(ms, 10)),
-        "think_ms": 1e3 * float(np.median(thought[WARM:])),
-        "alerts": float(np.mean(alerts[WARM:])),
+        "think_ms": 1e3 * float(np.median(reasoning_s[WARM_UP_STEPS:])),
+        "alerts": float(np.mean(alerts[WARM_UP_STEPS:])),
     }
 
 
@@ -149,35 +151,35 @@ def _replay_fps(folder: Path) -> float:
     recording = Recording.open(folder)
     settings = replace(settings_for(recording, tasks=TASKS[:1]), rules=())
     begin = time.process_time()
-    told = replay(recording, settings)
-    return told.steps / (time.process_time() - begin)
+    transcript = replay(recording, settings)
+    return transcript.steps / (time.process_time() - begin)
 
 
-def _observers(settings: WatchSettings, place: Path) -> float:
+def _observer_share(settings: WatchSettings, path: Path) -> float:
     """Time of the cycle's thread in observers, relative to that of reasoning."""
-    sinks = Sinks([f"file:{place}", "webhook:http://127.0.0.1:9/"], "scripted")
+    sinks = Sinks([f"file:{path}", "webhook:http://127.0.0.1:9/"], "scripted")
     blank = Frame(0, 0.0, np.zeros((SIZE[1], SIZE[0], 3), np.uint8))
     agent = reasoning_agent(settings)
-    thought, told = [], []
-    for one in drifting_boxes(COUNTS[0], LEAST_STEPS, 2):
+    reasoning_s, observer_s = [], []
+    for observation in drifting_boxes(COUNTS[0], MIN_STEPS, 2):
         begin = time.thread_time()
-        step = agent.reason(one)
+        step = agent.reason(observation)
         middle = time.thread_time()
         sinks(step, blank)
-        thought.append(middle - begin)
-        told.append(time.thread_time() - middle)
+        reasoning_s.append(middle - begin)
+        observer_s.append(time.thread_time() - middle)
     sinks.close()
-    return float(np.sum(told[WARM:]) / np.sum(thought[WARM:]))
+    return float(np.sum(observer_s[WARM_UP_STEPS:]) / np.sum(reasoning_s[WARM_UP_STEPS:]))
 
 
 def _mind_kb(count: int) -> float:
     agent: Agent = reasoning_agent(WatchSettings("scripted"))
     minds: list[Mind] = []
-    for k, one in enumerate(drifting_boxes(COUNTS[0], WARM + count, 1)):
-        if k == WARM:
+    for k, observation in enumerate(drifting_boxes(COUNTS[0], WARM_UP_STEPS + count, 1)):
+        if k == WARM_UP_STEPS:
             gc.collect()
-            before = resident_mb()
-        mind = agent.reason(one).mind
-        if k >= WARM:
+            initial_mb = resident_mb()
+        mind = agent.reason(observation).mind
+        if k >= WARM_UP_STEPS:
             minds.append(mind)
-    return 1024 * (resident_mb() - before) / len(minds)
+    return 1024 * (resident_mb() - initial_mb) / len(minds)

@@ -30,11 +30,11 @@ from visup.runs.settings import RunOptions, WatchSettings
 from visup.terminal.console import make_console
 from visup.terminal.narrator import Narrator
 
-KILLED_AGAIN = 0.25
-STATELESS = 1 / 3
+SECOND_KILL_PROBABILITY = 0.25
+STATELESS_PROBABILITY = 1 / 3
 STATE_EVERY_S = 0.4
-MOST_RESUMES = 20
-LONGEST_START_S = 60.0
+MAX_RESUMES = 20
+MAX_START_S = 60.0
 SIZE, FRAMES, FPS = (96, 72), 50, 10.0
 
 
@@ -71,16 +71,16 @@ def evaluate_resume(
     counts: dict[str, _ResumeCounts] = {"with states": _ResumeCounts(), "without": _ResumeCounts()}
     failures: list[str] = []
     with tempfile.TemporaryDirectory() as scratch:
-        place = Path(scratch)
-        settings = settings or WatchSettings(source=str(crossing(place / "clip.avi", seed)))
-        unbroken = _unbroken_run(settings, place / "whole", state_every_s)
+        folder = Path(scratch)
+        settings = settings or WatchSettings(source=str(crossing(folder / "clip.avi", seed)))
+        unbroken = _unbroken_run(settings, folder / "whole", state_every_s)
         for trial in range(kills):
             progress(f"{trial} of {kills} runs killed")
-            stateless = rng.random() < STATELESS
+            stateless = rng.random() < STATELESS_PROBABILITY
             every = 0.0 if stateless else state_every_s
-            one = counts["without" if stateless else "with states"]
-            said = _trial(unbroken, place / f"{trial}", every, rng, one)
-            failures += [f"run {trial}: {text}" for text in said]
+            group = counts["without" if stateless else "with states"]
+            differences = _trial(unbroken, folder / f"{trial}", every, rng, group)
+            failures += [f"run {trial}: {text}" for text in differences]
     items = {name: t.figures() for name, t in counts.items() if t.kills}
     total = sums_of(list(items.values()), ("kills", "early", "equal", "lost"))
     return {"items": items, "total": {**total, "whole_s": unbroken.seconds}, "failures": failures}
@@ -92,14 +92,16 @@ def crossing(path: Path, seed: int) -> Path:
 
     rng = np.random.default_rng(seed)
     width, height = SIZE
-    grain = cv2.GaussianBlur(rng.integers(0, 255, (height, width, 3)).astype(np.uint8), (0, 0), 1.5)
+    background = cv2.GaussianBlur(
+        rng.integers(0, 255, (height, width, 3)).astype(np.uint8), (0, 0), 1.5
+    )
     squares = [
         cv2.GaussianBlur(rng.integers(0, 255, (26, 26, 3)).astype(np.uint8), (0, 0), 1.2)
         for _ in range(2)
     ]
     writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), FPS, SIZE)
     for i in range(FRAMES):
-        image = grain + rng.normal(0.0, 1.5, grain.shape)
+        image = background + rng.normal(0.0, 1.5, background.shape)
         for square, x, y in ((squares[0], int(1.6 * i), 8), (squares[1], 70 - int(1.6 * i), 40)):
             x = int(np.clip(x, 0, width - 26))
             image[y : y + 26, x : x + 26] = square
@@ -129,7 +131,7 @@ class _UnbrokenRun:
 
 
 def _unbroken_run(settings: WatchSettings, folder: Path, every: float) -> _UnbrokenRun:
-    child = _begin(settings, folder, every)
+    child = _start_run(settings, folder, every)
     begin = time.perf_counter()
     _wait(child)
     return _UnbrokenRun(settings, time.perf_counter() - begin, _outcome(folder))
@@ -144,37 +146,37 @@ def _trial(
 ) -> Sequence[str]:
     """Kill one run and resume it to its end; returns the differences."""
     counts.kills += 1
-    _kill(_begin(unbroken.settings, folder, every), float(rng.uniform(0.0, unbroken.seconds)))
-    if not _recorded(folder):
+    _kill(_start_run(unbroken.settings, folder, every), float(rng.uniform(0.0, unbroken.seconds)))
+    if not _has_recording(folder):
         counts.early += 1
         counts.equal += not _printed(folder)
         return ["nothing was recorded, but events were printed"] if _printed(folder) else []
     missing = _missing(folder)
-    for _ in range(MOST_RESUMES):
+    for _ in range(MAX_RESUMES):
         begin = time.perf_counter()
         child = _resume(folder, every)
         if child is None:
             break
         counts.resumed += 1
-        if rng.random() < KILLED_AGAIN:
+        if rng.random() < SECOND_KILL_PROBABILITY:
             _kill(child, float(rng.uniform(0.0, unbroken.seconds)))
         else:
             _wait(child)
             counts.seconds.append(time.perf_counter() - begin)
         missing += _missing(folder)
     counts.lost += missing
-    same = _outcome(folder) == unbroken.outcome
-    counts.equal += same
-    said = [] if same else ["another outcome than the unbroken run's"]
-    return [*said, *([f"{missing} printed events are missing"] if missing else [])]
+    equal = _outcome(folder) == unbroken.outcome
+    counts.equal += equal
+    differences = [] if equal else ["another outcome than the unbroken run's"]
+    return [*differences, *([f"{missing} printed events are missing"] if missing else [])]
 
 
-def _begin(settings: WatchSettings, folder: Path, every: float) -> int:
+def _start_run(settings: WatchSettings, folder: Path, every: float) -> int:
     """Start a run in a process; returns after recording has begun."""
     folder.mkdir()
-    child = _forked(folder, lambda console: _supervise(settings, folder, every, console, False))
-    until = time.monotonic() + LONGEST_START_S
-    while not (folder / JOURNAL).exists() and time.monotonic() < until:
+    child = _fork(folder, lambda console: _supervise(settings, folder, every, console, False))
+    deadline = time.monotonic() + MAX_START_S
+    while not (folder / JOURNAL).exists() and time.monotonic() < deadline:
         time.sleep(0.005)
     return child
 
@@ -182,22 +184,24 @@ def _begin(settings: WatchSettings, folder: Path, every: float) -> int:
 def _resume(folder: Path, every: float) -> int | None:
     """Resume a run in a process, or return None if the run has ended."""
     try:
-        past = interrupted_run(folder)
+        interrupted = interrupted_run(folder)
     except OutputError:
         return None
-    return _forked(folder, lambda console: _supervise(past.settings, folder, every, console, True))
+    return _fork(
+        folder, lambda console: _supervise(interrupted.settings, folder, every, console, True)
+    )
 
 
 def _supervise(
     settings: WatchSettings, folder: Path, every: float, console: Console, resume: bool
 ) -> None:
-    past = interrupted_run(folder) if resume else None
+    interrupted = interrupted_run(folder) if resume else None
     options = RunOptions(video=False, report=False, state_every_s=every)
     audience = Audience([Narrator(console, True)])
-    supervise(settings, folder, audience=audience, options=options, past=past)
+    supervise(settings, folder, audience=audience, options=options, past=interrupted)
 
 
-def _forked(folder: Path, run: Callable[[Console], None]) -> int:
+def _fork(folder: Path, run: Callable[[Console], None]) -> int:
     """Run a function in a child process with redirected output; returns its process id."""
     child = os.fork()
     if child:
@@ -210,8 +214,8 @@ def _forked(folder: Path, run: Callable[[Console], None]) -> int:
         run(make_console())
         sys.stdout.flush()
         code = 0
-    except VisupError as fault:
-        os.write(2, f"{fault}\n".encode())
+    except VisupError as error:
+        os.write(2, f"{error}\n".encode())
     finally:
         os._exit(code)
 
@@ -229,7 +233,7 @@ def _wait(child: int) -> None:
         raise OutputError("a run that was not killed failed")
 
 
-def _recorded(folder: Path) -> bool:
+def _has_recording(folder: Path) -> bool:
     """Whether anything was recorded before the kill."""
     try:
         return "settings" in Recording.open(folder).facts()

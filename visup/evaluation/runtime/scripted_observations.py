@@ -77,11 +77,11 @@ def _box_observation(
     percepts.append(Percept("health", Health(HealthStatus.OK), now, "script"))
     if index % 5 == 0:
         for r in regions:
-            own = BOX_NAMES[(r.id - 1) % 3]
-            other = BOX_NAMES[int(rng.integers(len(BOX_NAMES)))]
-            for name, similarity in ((own, 0.7), (other, 0.65 + 0.1 * rng.random())):
-                said = Hypothesis(r.id, name, 0, similarity)
-                percepts.append(Percept("hypothesis", said, now, "script"))
+            true_name = BOX_NAMES[(r.id - 1) % 3]
+            wrong_name = BOX_NAMES[int(rng.integers(len(BOX_NAMES)))]
+            for name, similarity in ((true_name, 0.7), (wrong_name, 0.65 + 0.1 * rng.random())):
+                hypothesis = Hypothesis(r.id, name, 0, similarity)
+                percepts.append(Percept("hypothesis", hypothesis, now, "script"))
     gives = ("region", "health", "hypothesis") if index % 5 == 0 else ("region", "health")
     report = Report("script", ReportState.RAN, gives, tuple(percepts))
     return Observation(index, now, SIZE, (report,))

@@ -32,9 +32,9 @@ from visup.runs.settings import WatchSettings
 from visup.runs.wiring import reasoning_agent
 from visup.sinks import Sinks
 
-LEAST_FRAMES = 2000
+MIN_FRAMES = 2000
 LIMITS = JournalLimits(segment_bytes=32 * 2**20, keep_bytes=128 * 2**20)
-PAIRS = 12  # alternating blocks with and without sinks
+BLOCK_PAIRS = 12  # alternating blocks with and without sinks
 
 
 def evaluate_soak(frames: int = 200_000, *, progress: Progress = silent) -> dict[str, Any]:
@@ -49,25 +49,25 @@ def evaluate_soak(frames: int = 200_000, *, progress: Progress = silent) -> dict
         with `ms` (median processor time of a step with its journal) and `rss_mb`; `total` with `frames`,
         `slower` (end by a fresh run that takes turns with it there, since machines are busier at times),
         `rss_grown_mb`, `journal_bytes` for each frame, `disk_mb`, `same` (1 when
-        the first `LEAST_FRAMES` frames twice gave the same bytes of events), `replay_fps` (frames per
+        the first `MIN_FRAMES` frames twice gave the same bytes of events), `replay_fps` (frames per
         second of processor time), and `sinks` (time of a step with a file and a webhook that answers
         nobody, by that without).
 
     Raises:
         SettingsError: There are too few frames.
     """
-    if frames < LEAST_FRAMES:
-        raise SettingsError(f"--frames is {frames}", expected=f"at least {LEAST_FRAMES}")
+    if frames < MIN_FRAMES:
+        raise SettingsError(f"--frames is {frames}", expected=f"at least {MIN_FRAMES}")
     with tempfile.TemporaryDirectory() as scratch:
-        place = Path(scratch)
+        scratch_folder = Path(scratch)
         progress("the same twice")
-        prints = [_events_of(place / name, LEAST_FRAMES) for name in ("once", "twice")]
-        rate = _replay_fps(place / "once")
+        digests = [_events_of(scratch_folder / name, MIN_FRAMES) for name in ("once", "twice")]
+        replay_fps = _replay_fps(scratch_folder / "once")
         progress("sinks")
-        ratio = sinks_ratio(place, LEAST_FRAMES)
-        folder = place / "long"
+        ratio = sinks_ratio(scratch_folder, MIN_FRAMES)
+        folder = scratch_folder / "long"
         folder.mkdir()
-        costs, beside, memory = _long(folder, frames, progress)
+        costs, fresh_costs, memory = _long_run(folder, frames, progress)
         disk = sum(p.stat().st_size for p in segments(folder / JOURNAL))
     tenth = frames // 10
     start, end = costs[frames // 100 : tenth], costs[-tenth:]
@@ -78,12 +78,12 @@ def evaluate_soak(frames: int = 200_000, *, progress: Progress = silent) -> dict
     }
     total = {
         "frames": frames,
-        "slower": float(np.median(end[warm:]) / np.median(beside[warm:])),
+        "slower": float(np.median(end[warm:]) / np.median(fresh_costs[warm:])),
         "rss_grown_mb": memory[-1] - memory[0],
-        "journal_bytes": _bytes_each(LEAST_FRAMES),
+        "journal_bytes": _mean_observation_bytes(MIN_FRAMES),
         "disk_mb": disk / 2**20,
-        "same": int(prints[0] == prints[1]),
-        "replay_fps": rate,
+        "same": int(digests[0] == digests[1]),
+        "replay_fps": replay_fps,
         "sinks": ratio,
     }
     return {"items": items, "total": total}
@@ -97,24 +97,24 @@ def _journal(folder: Path, limits: JournalLimits | None = None) -> Journal:
     return journal
 
 
-def _long(
+def _long_run(
     folder: Path, frames: int, progress: Progress
 ) -> tuple[list[float], list[float], list[float]]:
     """Costs of the steps of a long run, of a fresh run during its last tenth, and memory."""
     long, fresh = _JournaledAgent(folder, LIMITS), None
     last_tenth = frames - frames // 10
     memory: list[float] = []
-    for seen in moving_ellipses(frames):
-        long.step(seen)
-        if seen.frame_index == last_tenth:
+    for observation in moving_ellipses(frames):
+        long.step(observation)
+        if observation.frame_index == last_tenth:
             memory.append(resident_mb())
             fresh = _JournaledAgent(folder / "fresh", LIMITS)
         if fresh:
-            fresh.step(seen)
-        if seen.frame_index == frames // 10:
+            fresh.step(observation)
+        if observation.frame_index == frames // 10:
             memory.append(resident_mb())
-        if seen.frame_index % 1000 == 0:
-            progress(f"{seen.frame_index} of {frames} frames")
+        if observation.frame_index % 1000 == 0:
+            progress(f"{observation.frame_index} of {frames} frames")
     long.journal.close()
     assert fresh is not None
     fresh.journal.close()
@@ -144,8 +144,8 @@ def _events_of(folder: Path, frames: int) -> str:
     folder.mkdir()
     agent = reasoning_agent(WatchSettings("scripted", tasks=("dock",)))
     journal = _journal(folder)
-    for seen in moving_ellipses(frames):
-        journal.record(agent.reason(seen))
+    for observation in moving_ellipses(frames):
+        journal.record(agent.reason(observation))
     journal.close()
     export_events(folder / JOURNAL, folder / "events.jsonl")
     return hashlib.sha256((folder / "events.jsonl").read_bytes()).hexdigest()
@@ -155,43 +155,43 @@ def _replay_fps(folder: Path) -> float:
     recording = Recording.open(folder)
     settings = settings_for(recording)
     begin = time.process_time()
-    told = replay(recording, settings)
-    return told.steps / (time.process_time() - begin)
+    transcript = replay(recording, settings)
+    return transcript.steps / (time.process_time() - begin)
 
 
-def _bytes_each(frames: int) -> float:
+def _mean_observation_bytes(frames: int) -> float:
     from visup.agent.storage.codec import pack_observation
 
-    sizes = [len(pack_observation(seen)) for seen in moving_ellipses(frames // 20)]
+    sizes = [len(pack_observation(observation)) for observation in moving_ellipses(frames // 20)]
     return float(np.mean(sizes))
 
 
-def sinks_ratio(place: Path, frames: int, also: tuple[str, ...] = ()) -> float:
+def sinks_ratio(folder: Path, frames: int, also: tuple[str, ...] = ()) -> float:
     """Processor time of the cycle's thread for a step with observers, relative to that without.
 
     Args:
-        place: A folder for their files.
+        folder: A folder for their files.
         frames: Total number of frames.
         also: Further sinks, as in `--sink`.
 
     Short blocks with and without alternate, so that other load affects both alike.
     """
-    wanted = [f"file:{place / 'alerts.jsonl'}", "webhook:http://127.0.0.1:9/", *also]
+    destinations = [f"file:{folder / 'alerts.jsonl'}", "webhook:http://127.0.0.1:9/", *also]
     # The webhook answers nobody, and is not waited for: all is measured by then.
-    sinks = Sinks(wanted, "scripted", closing_s=0.2)
-    block = frames // (2 * PAIRS)
-    taken: tuple[list[float], list[float]] = ([], [])
+    sinks = Sinks(destinations, "scripted", closing_s=0.2)
+    block = frames // (2 * BLOCK_PAIRS)
+    block_seconds: tuple[list[float], list[float]] = ([], [])
     agent = reasoning_agent(WatchSettings("scripted", tasks=("dock",)))
     blank = Frame(0, 0.0, np.zeros((SIZE[1], SIZE[0], 3), np.uint8))
-    for number in range(2 * PAIRS):
-        watched = number % 2
-        observers: list[Callable[[Step, Frame], None]] = [sinks] if watched else []
-        seen = list(moving_ellipses(block, number * block))
+    for number in range(2 * BLOCK_PAIRS):
+        with_sinks = number % 2
+        observers: list[Callable[[Step, Frame], None]] = [sinks] if with_sinks else []
+        observations = list(moving_ellipses(block, number * block))
         begin = time.perf_counter()
-        for one in seen:
-            step = agent.reason(one)
+        for observation in observations:
+            step = agent.reason(observation)
             for observer in observers:
                 observer(step, blank)
-        taken[watched].append(time.perf_counter() - begin)
+        block_seconds[with_sinks].append(time.perf_counter() - begin)
     sinks.close()
-    return float(np.percentile(taken[1], 25) / np.percentile(taken[0], 25))
+    return float(np.percentile(block_seconds[1], 25) / np.percentile(block_seconds[0], 25))

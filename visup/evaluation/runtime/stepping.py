@@ -28,20 +28,20 @@ from visup.runs.settings import WatchSettings
 from visup.runs.wiring import reasoning_agent
 from visup.stepping import ScriptedObservations, Stepper
 
-BACK = 500
-BACK_MS = 200.0
-KEPT_MB = 200.0
-KEPT_STEPS = 10_000
-LEAST_STEPS = 1000
+BACK_STEPS = 500
+MAX_BACK_MS = 200.0
+MAX_KEPT_MB = 200.0
+REFERENCE_STEPS = 10_000
+MIN_STEPS = 1000
 BLOCK = 50  # steps made alternately with and without a stepper
 BLOCKS = 12
 VISITS = 30
-WARM = 100
-EVERY = 50  # interval of steps whose digests are compared
+WARM_UP_STEPS = 100
+DIGEST_INTERVAL = 50  # interval of steps whose digests are compared
 
 
 def evaluate_stepping(
-    steps: int = KEPT_STEPS, *, seed: int = 0, progress: Progress = silent
+    steps: int = REFERENCE_STEPS, *, seed: int = 0, progress: Progress = silent
 ) -> dict[str, Any]:
     """Measure a long timeline.
 
@@ -61,33 +61,35 @@ def evaluate_stepping(
     Raises:
         SettingsError: There are too few steps.
     """
-    if steps < LEAST_STEPS:
-        raise SettingsError(f"--steps is {steps}", expected=f"at least {LEAST_STEPS}")
+    if steps < MIN_STEPS:
+        raise SettingsError(f"--steps is {steps}", expected=f"at least {MIN_STEPS}")
     progress("by itself and stepped, in turn")
-    slower = _slower()
+    slower = _relative_step_time()
     stepper = _stepper(steps + 10)
-    digests, grown_mb = _stepped(stepper, steps, progress)
+    digests, grown_mb = _fill_timeline(stepper, steps, progress)
     progress("going back")
-    items, same = _visits(
-        stepper, np.random.default_rng(seed).integers(BACK + 1, steps, VISITS), digests
+    items, same = _measure_visits(
+        stepper, np.random.default_rng(seed).integers(BACK_STEPS + 1, steps, VISITS), digests
     )
     total = {
         "steps": steps,
-        "kept_mb": grown_mb * KEPT_STEPS / (steps - WARM),
+        "kept_mb": grown_mb * REFERENCE_STEPS / (steps - WARM_UP_STEPS),
         "same": float(np.mean(same)),
         "slower": slower,
     }
     return {"items": items, "total": total}
 
 
-def _stepped(stepper: Stepper, steps: int, progress: Progress) -> tuple[dict[int, bytes], float]:
+def _fill_timeline(
+    stepper: Stepper, steps: int, progress: Progress
+) -> tuple[dict[int, bytes], float]:
     """Digests of every 50th step, and growth of memory, MB."""
     digests: dict[int, bytes] = {}
-    stepper.step(WARM)
+    stepper.step(WARM_UP_STEPS)
     gc.collect()
     before = resident_mb()
     while stepper.at < steps:
-        step = stepper.step(EVERY).step
+        step = stepper.step(DIGEST_INTERVAL).step
         assert step is not None
         digests[stepper.at] = _digest(step)
         if stepper.at % 1000 == 0:
@@ -96,44 +98,51 @@ def _stepped(stepper: Stepper, steps: int, progress: Progress) -> tuple[dict[int
     return digests, resident_mb() - before
 
 
-def _visits(
-    stepper: Stepper, places: NDArray[np.int64], digests: dict[int, bytes]
+def _measure_visits(
+    stepper: Stepper, positions: NDArray[np.int64], digests: dict[int, bytes]
 ) -> tuple[dict[str, dict[str, float]], list[bool]]:
     """Times of going back, looking and branching from these steps; whether the following steps are equal."""
     back, look, branch, same = [], [], [], []
-    for place in map(int, places):
-        stepper.go(place)
-        back.append(_ms(lambda: stepper.back(BACK)))
-        near = -(-stepper.at // EVERY) * EVERY
-        step = stepper.go(max(near, WARM + EVERY))
+    for position in map(int, positions):
+        stepper.go(position)
+        back.append(_ms(lambda: stepper.back(BACK_STEPS)))
+        digest_position = -(-stepper.at // DIGEST_INTERVAL) * DIGEST_INTERVAL
+        step = stepper.go(max(digest_position, WARM_UP_STEPS + DIGEST_INTERVAL))
         same.append(step is not None and _digest(step) == digests[stepper.at])
-        stepper.go(place)
-        look.append(_ms(partial(stepper.at_step, place - BACK)))
-        stepper.back(BACK)
+        stepper.go(position)
+        look.append(_ms(partial(stepper.at_step, position - BACK_STEPS)))
+        stepper.back(BACK_STEPS)
         branch.append(_ms(lambda: stepper.branch().step(1)))
     return {"back": _times(back), "look": _times(look), "branch": _times(branch)}, same
 
 
-def missed(figures: dict[str, Any]) -> list[str]:
+def missed_bars(figures: dict[str, Any]) -> list[str]:
     """The bars that figures miss, one sentence each."""
     back, kept = figures["items"]["back"]["most_ms"], figures["total"]["kept_mb"]
-    found = [f"back({BACK}) took {back:.0f} ms, the bar is {BACK_MS:g}"] if back > BACK_MS else []
-    if kept > KEPT_MB:
-        found.append(f"{KEPT_STEPS} steps keep {kept:.0f} MB, the bar is {KEPT_MB:g}")
+    missed = (
+        [f"back({BACK_STEPS}) took {back:.0f} ms, the bar is {MAX_BACK_MS:g}"]
+        if back > MAX_BACK_MS
+        else []
+    )
+    if kept > MAX_KEPT_MB:
+        missed.append(f"{REFERENCE_STEPS} steps keep {kept:.0f} MB, the bar is {MAX_KEPT_MB:g}")
     if figures["total"]["same"] < 1.0:
-        found.append("steps after going back differ from those before")
-    return found
+        missed.append("steps after going back differ from those before")
+    return missed
 
 
 def _stepper(steps: int) -> Stepper:
-    return Stepper(_agent(), ScriptedObservations(_own(seen) for seen in moving_ellipses(steps)))
+    return Stepper(
+        _agent(),
+        ScriptedObservations(_with_own_arrays(o) for o in moving_ellipses(steps)),
+    )
 
 
 def _agent() -> Any:
     return reasoning_agent(WatchSettings("scripted", tasks=("dock",)))
 
 
-def _own(observation: Observation) -> Observation:
+def _with_own_arrays(observation: Observation) -> Observation:
     """The same with masks and outlines of its own."""
 
     def owned(value: object) -> object:
@@ -148,44 +157,46 @@ def _own(observation: Observation) -> Observation:
     return replace(observation, reports=reports)
 
 
-def _slower() -> float:
+def _relative_step_time() -> float:
     """Short blocks with and without alternate, so that other load affects both."""
-    agent, it = _agent(), _stepper((BLOCKS + 1) * BLOCK)
-    frames: Iterator[Observation] = (_own(seen) for seen in moving_ellipses((BLOCKS + 1) * BLOCK))
+    agent, stepper = _agent(), _stepper((BLOCKS + 1) * BLOCK)
+    frames: Iterator[Observation] = (
+        _with_own_arrays(observation) for observation in moving_ellipses((BLOCKS + 1) * BLOCK)
+    )
     alone, stepped = [], []
     for _ in range(BLOCKS + 1):
         block = [next(frames) for _ in range(BLOCK)]
         begin = time.process_time()
-        for seen in block:
-            agent.reason(seen)
+        for observation in block:
+            agent.reason(observation)
         middle = time.process_time()
-        it.step(BLOCK)
+        stepper.step(BLOCK)
         alone.append(middle - begin)
         stepped.append(time.process_time() - middle)
-    making = _making()
-    return float((np.percentile(stepped[1:], 25) - making) / np.percentile(alone[1:], 25))
+    generation_s = _generation_time()
+    return float((np.percentile(stepped[1:], 25) - generation_s) / np.percentile(alone[1:], 25))
 
 
-def _making() -> float:
+def _generation_time() -> float:
     """Processor time for generating a block of percepts, to be subtracted."""
-    taken = []
+    seconds = []
     for _ in range(5):
         begin = time.process_time()
-        for seen in moving_ellipses(BLOCK):
-            _own(seen)
-        taken.append(time.process_time() - begin)
-    return float(np.percentile(taken, 25))
+        for observation in moving_ellipses(BLOCK):
+            _with_own_arrays(observation)
+        seconds.append(time.process_time() - begin)
+    return float(np.percentile(seconds, 25))
 
 
-def whole(mind: Mind) -> Mind:
+def canonical_mind(mind: Mind) -> Mind:
     """The same mind with its samples in canonical memory layout, which is no part of the beliefs."""
-    kept = mind.recall(RELATIONS)
-    return mind.remember(RELATIONS, replace(kept, history=replace(kept.history, start=0)))
+    memory = mind.recall(RELATIONS)
+    return mind.remember(RELATIONS, replace(memory, history=replace(memory.history, start=0)))
 
 
 def _digest(step: Step) -> bytes:
     return hashlib.sha256(
-        dump_state((step.mind.objects, whole(step.mind).memory, step.events, step.alerts))
+        dump_state((step.mind.objects, canonical_mind(step.mind).memory, step.events, step.alerts))
     ).digest()
 
 
@@ -195,5 +206,5 @@ def _ms(work: Callable[[], object]) -> float:
     return (time.process_time() - begin) * 1e3
 
 
-def _times(taken: list[float]) -> dict[str, float]:
-    return {"median_ms": float(np.median(taken)), "most_ms": max(taken)}
+def _times(times: list[float]) -> dict[str, float]:
+    return {"median_ms": float(np.median(times)), "most_ms": max(times)}

@@ -38,12 +38,12 @@ from visup.runs.wiring import reasoning_agent
 from visup.testing import region_of
 
 LANES = 3
-EVERY_S = 2.9
+CAR_INTERVAL_S = 2.9
 """Seconds from car to car in a lane: some 3,700 an hour in all."""
 SPEED = 160.0
 """Pixels per second; each further lane is a fifth faster."""
-CAR = (72, 40)
-TREMBLE = 12
+CAR_SIZE = (72, 40)
+OUTLINES = 12
 """Number of outlines of a car, of which one is drawn for each frame."""
 BLOCKS = 20
 """Number of memory measurements; the median of each half counts."""
@@ -102,22 +102,22 @@ def _run(folder: Path, frames: int, progress: Progress) -> TrafficCosts:
     journal.note(settings=to_jsonable(WatchSettings("traffic", preset="traffic")))
     memory, ms, numbers = list[float](), list[float](), set[int]()
     block, begin = max(1, frames // BLOCKS), time.process_time()
-    for seen in traffic(frames):
-        step = agent.reason(seen)
+    for observation in traffic(frames):
+        step = agent.reason(observation)
         journal.record(step)
-        numbers.update(_present(step.mind))
-        if (seen.frame_index + 1) % block == 0:
+        numbers.update(_present_ids(step.mind))
+        if (observation.frame_index + 1) % block == 0:
             ms.append((time.process_time() - begin) / block * 1e3)
             gc.collect()
             memory.append(resident_mb())
-            progress(f"{seen.frame_index + 1} of {frames} frames, {memory[-1]:.0f} MB")
+            progress(f"{observation.frame_index + 1} of {frames} frames, {memory[-1]:.0f} MB")
             begin = time.process_time()
     journal.close()
     size = sum(p.stat().st_size for p in segments(folder / JOURNAL))
     return TrafficCosts(memory, ms, size / 2**20, max(numbers, default=0))
 
 
-def _present(mind: Mind) -> Iterator[int]:
+def _present_ids(mind: Mind) -> Iterator[int]:
     return (b.id for b in mind.present())
 
 
@@ -139,27 +139,27 @@ Masks = list[NDArray[np.bool_]]
 
 def _outlines(rng: np.random.Generator) -> Masks:
     """Masks of one car with edges that jitter by a pixel."""
-    width, height = CAR
-    found = []
-    for _ in range(TREMBLE):
+    width, height = CAR_SIZE
+    masks = []
+    for _ in range(OUTLINES):
         mask = np.zeros((height, width), bool)
         for x in range(width):
             round_off = int(8 * (2 * abs(x / width - 0.5)) ** 4)
             top, bottom = rng.integers(0, 3, 2) + round_off
             mask[top : height - bottom, x] = True
-        found.append(mask)
-    return found
+        masks.append(mask)
+    return masks
 
 
 def _lane(lane: int, now: float, masks: Masks, rng: np.random.Generator) -> Iterator[Region]:
     """The visible cars of a lane, the newest last."""
     speed = SPEED * (1 + 0.2 * lane)
-    span = (SIZE[0] + CAR[0]) / speed
-    first, last = int((now - span) // EVERY_S) + 1, int(now // EVERY_S)
+    span = (SIZE[0] + CAR_SIZE[0]) / speed
+    first, last = int((now - span) // CAR_INTERVAL_S) + 1, int(now // CAR_INTERVAL_S)
     for car in range(max(0, first), last + 1):
-        x = round((now - car * EVERY_S) * speed) - CAR[0]
-        left, right = max(0, x), min(SIZE[0], x + CAR[0])
-        mask = masks[int(rng.integers(TREMBLE))][:, left - x : right - x]
+        x = round((now - car * CAR_INTERVAL_S) * speed) - CAR_SIZE[0]
+        left, right = max(0, x), min(SIZE[0], x + CAR_SIZE[0])
+        mask = masks[int(rng.integers(OUTLINES))][:, left - x : right - x]
         if right - left < 4 or not mask.any():
             continue
         number = 1 + lane + LANES * car

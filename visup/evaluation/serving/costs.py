@@ -19,10 +19,10 @@ from visup.serving.site.form import CameraTable
 NOISE = 2.0
 """Noise of each pixel, grey levels: that of a camera in a lit room."""
 
-SETTLE_S = 12.0
+WARM_UP_S = 12.0
 """Warm-up until the scene is known, seconds of the source."""
 
-WATCHED_S, BUSY_S = 60.0, 6.0
+IDLE_S, BUSY_S = 60.0, 6.0
 """Measured time, seconds of the source: idle, and busy."""
 
 
@@ -42,7 +42,7 @@ def camera_costs(seed: int = 0) -> dict[str, float]:
     frames = scene(seed)
     rest_s = float(CameraTable.model_fields["rest_s"].default)
     return {
-        "idle_cpu": _share(frames[-1:], rest_s, WATCHED_S, seed),
+        "idle_cpu": _share(frames[-1:], rest_s, IDLE_S, seed),
         "idle_cpu_without_rest": _share(frames[-1:], None, BUSY_S, seed),
         "busy_cpu": _share(frames[4 : CROSSING - 4 : 2], rest_s, BUSY_S, seed),
     }
@@ -58,13 +58,13 @@ def _share(
     used = 0.0
     for number, picture in enumerate(cycle(pictures)):
         now = number / PACE
-        if now >= SETTLE_S + watched_s:
+        if now >= WARM_UP_S + watched_s:
             break
         image = np.clip(picture + noise[number % len(noise)], 0, 255).astype(np.uint8)
         begin = time.process_time()
         agent.step(Frame(number, now, image))
         ring.add(encoded(image, now))
-        used += (time.process_time() - begin) if now >= SETTLE_S else 0.0
+        used += (time.process_time() - begin) if now >= WARM_UP_S else 0.0
     agent.close()
     return used / watched_s
 

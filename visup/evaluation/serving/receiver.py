@@ -7,7 +7,7 @@ import threading
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
-LARGEST = 2**20
+MAX_BODY_BYTES = 2**20
 
 
 class AlertReceiver:
@@ -47,11 +47,11 @@ class AlertReceiver:
 
         class ReceiverHandler(BaseHTTPRequestHandler):
             def do_POST(self) -> None:
-                size = min(int(self.headers.get("Content-Length", 0)), LARGEST)
+                size = min(int(self.headers.get("Content-Length", 0)), MAX_BODY_BYTES)
                 self.send_response(take(self.rfile.read(size)))
                 self.end_headers()
 
-            def log_message(self, *said: Any) -> None:
+            def log_message(self, *arguments: Any) -> None:
                 pass
 
         return ReceiverHandler

@@ -24,9 +24,9 @@ from urllib3.exceptions import HTTPError
 from visup.agent.model.errors import SettingsError
 from visup.agent.storage.atomic import write_atomically
 from visup.evaluation.figures import Progress, silent, sums_of
-from visup.evaluation.serving.account import Ledger
+from visup.evaluation.serving.alert_audit import AlertAuditor
 from visup.evaluation.serving.costs import camera_costs
-from visup.evaluation.serving.night import Balloon, Killer, Timetable
+from visup.evaluation.serving.fault_injection import DiskFiller, ProcessKiller, Timetable
 from visup.evaluation.serving.receiver import AlertReceiver
 from visup.evaluation.serving.scene import (
     CAMERA,
@@ -37,19 +37,19 @@ from visup.evaluation.serving.scene import (
     scene,
     write_clip,
 )
-from visup.evaluation.serving.streams import TroubledStream
+from visup.evaluation.serving.streams import FaultyStream
 
-NAMES = ("file-1", "file-2", "stream-1", "stream-2")
-START_S = 300.0
-LEDGER_S, SO_FAR_S = 20.0, 60.0
+CAMERAS = ("file-1", "file-2", "stream-1", "stream-2")
+MAX_START_S = 300.0
+AUDIT_INTERVAL_S, SAVE_INTERVAL_S = 20.0, 60.0
 """Seconds between readings of the journals, and between savings of the figures so far. Evidence deleted for
 lack of space is at least two minutes old."""
 
-CALM_S = 30.0
+FAULT_FREE_S = 30.0
 """Time without faults at the end, seconds, in which pending alerts can be delivered."""
 
-DOWN_S, FULL_S = 20.0, 15.0
-LOOK_S = 0.2
+SINK_DOWN_S, DISK_FULL_S = 20.0, 15.0
+POLL_S = 0.2
 _SAMPLE = re.compile(r'^(visup_\w+)\{(?:.*,)?camera="([^"]+)"[^}]*\} (\S+)$', re.MULTILINE)
 
 
@@ -84,10 +84,10 @@ def evaluate_serving(
         prepare_store(store)
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        stage = Rehearsal(folder, store or folder / "store", seed, stack, so_far)
-        told = stage.rehearse(minutes, kill_every, progress)
+        rehearsal = Rehearsal(folder, store or folder / "store", seed, stack, so_far)
+        results = rehearsal.rehearse(minutes, kill_every, progress)
     progress("what a camera takes")
-    return {**told, "total": {**told["total"], **camera_costs(seed)}}
+    return {**results, "total": {**results["total"], **camera_costs(seed)}}
 
 
 def prepare_store(store: Path) -> None:
@@ -99,18 +99,18 @@ def prepare_store(store: Path) -> None:
     try:
         store.mkdir(parents=True, exist_ok=True)
         occupied = any(store.iterdir())
-    except (FileExistsError, NotADirectoryError) as fault:
+    except (FileExistsError, NotADirectoryError) as error:
         raise SettingsError(
             "the store, or a folder above it, is a file",
             where=str(store),
             expected="a folder, empty or new",
-        ) from fault
-    except OSError as fault:
+        ) from error
+    except OSError as error:
         raise SettingsError(
-            f"the store cannot be created or read ({fault.strerror})",
+            f"the store cannot be created or read ({error.strerror})",
             where=str(store),
             hint="choose a folder that you may write to",
-        ) from fault
+        ) from error
     if occupied:
         raise SettingsError(
             "the store is not empty",
@@ -138,23 +138,23 @@ class Rehearsal:
         store.mkdir(exist_ok=True)
         self._receiver = AlertReceiver()
         stack.callback(self._receiver.close)
-        scenes = [scene(seed + n) for n in range(len(NAMES))]
+        scenes = [scene(seed + n) for n in range(len(CAMERAS))]
         for number in (0, 1):
             write_clip(folder / f"{number}.webm", scenes[number])
-        self._streams = [TroubledStream(jpegs(s), seed + n) for n, s in enumerate(scenes[2:])]
+        self._streams = [FaultyStream(jpegs(s), seed + n) for n, s in enumerate(scenes[2:])]
         for stream in self._streams:
             stack.callback(stream.close)
-        self._balloon = Balloon(store)
-        stack.callback(self._balloon.empty)
-        self._killer = Killer(store, NAMES, seed)
-        self._ledgers = {name: Ledger(store / name) for name in NAMES}
-        self._monitoring = _free_port()
+        self._disk_filler = DiskFiller(store)
+        stack.callback(self._disk_filler.empty)
+        self._killer = ProcessKiller(store, CAMERAS, seed)
+        self._auditors = {name: AlertAuditor(store / name) for name in CAMERAS}
+        self._monitoring_port = _free_port()
         self._write_site()
         self._figures: dict[str, dict[str, float]] = {}
         self._memory: list[tuple[float, float]] = []
         self._watched_s = 1.0
-        self._wrongs = {"reloads": 0, "sink_down": 0}
-        self._ends: list[tuple[float, Any]] = []
+        self._fault_counts = {"reloads": 0, "sink_down": 0}
+        self._pending_ends: list[tuple[float, Any]] = []
 
     def rehearse(self, minutes: float, kill_every: float, progress: Progress) -> dict[str, Any]:
         """Run from the first frame to the account."""
@@ -162,46 +162,46 @@ class Rehearsal:
             self._wait_until_ready(process)
             begin = time.monotonic()
             end = begin + 60.0 * minutes
-            table, books = self._timetable(process, kill_every), self._books(begin)
+            table, measurements = self._timetable(process, kill_every), self._measurements(begin)
             while (now := time.monotonic()) < end and process.poll() is None:
-                self._look(process.pid)
-                if now < end - CALM_S:
+                self._read_metrics(process.pid)
+                if now < end - FAULT_FREE_S:
                     table.tick(now)
-                self._end_what_is_due(now)
-                books.tick(now)
+                self._end_due_faults(now)
+                measurements.tick(now)
                 left = (end - now) / 60.0
                 progress(f"{left:.1f} minutes left, {len(self._killer.kills)} kills")
-                time.sleep(LOOK_S)
-            asked = time.monotonic()
-            self._watched_s = asked - begin
+                time.sleep(POLL_S)
+            stop_requested = time.monotonic()
+            self._watched_s = stop_requested - begin
             process.send_signal(signal.SIGTERM)
             code = process.wait(60)
-            closing_s = time.monotonic() - asked
-            self._look_into_journals()
-            return self._keep(self._told(closing_s, code))
+            closing_s = time.monotonic() - stop_requested
+            self._read_stores()
+            return self._save(self._results(closing_s, code))
 
     def _write_site(self) -> None:
         loops = [f"loop:{self._folder / f'{n}.webm'}" for n in (0, 1)]
         sources = [*loops, *(s.url for s in self._streams)]
         cameras = (
             CAMERA.format(name=name, source=source, pace=PACE)
-            for name, source in zip(NAMES, sources, strict=True)
+            for name, source in zip(CAMERAS, sources, strict=True)
         )
         head = SITE.format(
             store=self._store,
             port=self._receiver.port,
-            monitoring=self._monitoring,
+            monitoring=self._monitoring_port,
             hours=2.0 / 60.0,
-            free_gb=0.05 if self._balloon.possible else 0.5,
+            free_gb=0.05 if self._disk_filler.possible else 0.5,
         )
         (self._folder / "own.rules").write_text(RULE)
         (self._folder / "site.toml").write_text(head + "".join(cameras))
 
     @contextmanager
     def _service(self) -> Iterator[subprocess.Popen[bytes]]:
-        words = [sys.executable, "-m", "visup.cli", "serve", str(self._folder / "site.toml")]
+        command = [sys.executable, "-m", "visup.cli", "serve", str(self._folder / "site.toml")]
         with (self._folder / "log").open("ab") as log:
-            process = subprocess.Popen([*words, "--json"], stderr=log)
+            process = subprocess.Popen([*command, "--json"], stderr=log)
         try:
             yield process
         finally:
@@ -209,109 +209,109 @@ class Rehearsal:
             process.wait()
 
     def _wait_until_ready(self, process: subprocess.Popen[bytes]) -> None:
-        until = time.monotonic() + START_S
-        while time.monotonic() < until and process.poll() is None:
-            self._look(process.pid)
-            if all(self._figures.get(n, {}).get("visup_frames_seen_total") for n in NAMES):
+        deadline = time.monotonic() + MAX_START_S
+        while time.monotonic() < deadline and process.poll() is None:
+            self._read_metrics(process.pid)
+            if all(self._figures.get(n, {}).get("visup_frames_seen_total") for n in CAMERAS):
                 return
-            time.sleep(LOOK_S)
+            time.sleep(POLL_S)
         raise SettingsError(
             "the service did not begin", where=(self._folder / "log").read_text()[-2000:]
         )
 
     def _timetable(self, process: subprocess.Popen[bytes], kill_every: float) -> Timetable:
         def reload() -> None:
-            self._wrongs["reloads"] += 1
+            self._fault_counts["reloads"] += 1
             process.send_signal(signal.SIGHUP)
 
         def sink_down() -> None:
-            self._wrongs["sink_down"] += 1
+            self._fault_counts["sink_down"] += 1
             self._receiver.down = True
-            self._ends.append((time.monotonic() + DOWN_S, self._sink_up))
+            self._pending_ends.append((time.monotonic() + SINK_DOWN_S, self._sink_up))
 
         def full() -> None:
-            if self._balloon.possible:
-                self._balloon.fill()
-                self._ends.append((time.monotonic() + FULL_S, self._balloon.empty))
+            if self._disk_filler.possible:
+                self._disk_filler.fill()
+                self._pending_ends.append((time.monotonic() + DISK_FULL_S, self._disk_filler.empty))
 
         def kill() -> None:
-            self._killer.strike(self._of_each("visup_restarts_total"))
+            self._killer.kill_one(self._metric_by_camera("visup_restarts_total"))
 
         return Timetable(((kill_every, kill), (100.0, reload), (75.0, sink_down), (130.0, full)))
 
-    def _books(self, begin: float) -> Timetable:
+    def _measurements(self, begin: float) -> Timetable:
         """The timetable of measurements."""
 
         def write() -> None:
             self._watched_s = time.monotonic() - begin
-            self._keep(self._told(0.0, None))
+            self._save(self._results(0.0, None))
 
-        return Timetable(((LEDGER_S, self._look_into_journals), (SO_FAR_S, write)))
+        return Timetable(((AUDIT_INTERVAL_S, self._read_stores), (SAVE_INTERVAL_S, write)))
 
-    def _keep(self, told: dict[str, Any]) -> dict[str, Any]:
+    def _save(self, results: dict[str, Any]) -> dict[str, Any]:
         """Save the figures so far, so that hours of work are not lost by a later fault."""
         if self._so_far:
-            write_atomically(self._so_far, json.dumps(told, indent=1).encode())
-        return told
+            write_atomically(self._so_far, json.dumps(results, indent=1).encode())
+        return results
 
-    def _look_into_journals(self) -> None:
-        for ledger in self._ledgers.values():
-            ledger.look()
+    def _read_stores(self) -> None:
+        for auditor in self._auditors.values():
+            auditor.read_store()
 
     def _sink_up(self) -> None:
         self._receiver.down = False
 
-    def _end_what_is_due(self, now: float) -> None:
-        for due in [e for e in self._ends if e[0] <= now]:
-            self._ends.remove(due)
-            due[1]()
+    def _end_due_faults(self, now: float) -> None:
+        for pending in [e for e in self._pending_ends if e[0] <= now]:
+            self._pending_ends.remove(pending)
+            pending[1]()
 
-    def _of_each(self, figure: str) -> dict[str, float]:
-        return {name: told.get(figure, 0.0) for name, told in self._figures.items()}
+    def _metric_by_camera(self, metric: str) -> dict[str, float]:
+        return {name: metrics.get(metric, 0.0) for name, metrics in self._figures.items()}
 
-    def _look(self, pid: int) -> None:
+    def _read_metrics(self, pid: int) -> None:
         """Read the metrics of the service."""
         with suppress(HTTPError):
-            at = f"http://127.0.0.1:{self._monitoring}/metrics"
-            page = urllib3.request("GET", at, timeout=5.0, retries=False).data.decode()
-            for figure, camera, value in _SAMPLE.findall(page):
-                self._figures.setdefault(camera, {})[figure] = float(value)
-            frames = self._of_each("visup_frames_seen_total")
-            self._killer.look(self._of_each("visup_restarts_total"), frames)
+            url = f"http://127.0.0.1:{self._monitoring_port}/metrics"
+            page = urllib3.request("GET", url, timeout=5.0, retries=False).data.decode()
+            for metric, camera, value in _SAMPLE.findall(page):
+                self._figures.setdefault(camera, {})[metric] = float(value)
+            frames = self._metric_by_camera("visup_frames_seen_total")
+            self._killer.note_recoveries(self._metric_by_camera("visup_restarts_total"), frames)
             cameras = [f.get("visup_memory_bytes", 0.0) for f in self._figures.values()]
-            if len(cameras) == len(NAMES) and all(cameras):
+            if len(cameras) == len(CAMERAS) and all(cameras):
                 used = sum(cameras) / 2**20 + _resident_mb(pid)
                 self._memory.append((time.monotonic(), used))
 
-    def _told(self, closing_s: float, code: int | None) -> dict[str, Any]:
-        items = {name: self._of_camera(name) for name in NAMES}
+    def _results(self, closing_s: float, code: int | None) -> dict[str, Any]:
+        items = {name: self._camera_results(name) for name in CAMERAS}
         keys = (
             *("alerts", "lost", "twice", "resent", "unrecorded", "without_evidence"),
             *("kills", "restarts", "frames", "dropped"),
         )
-        backs = [k.back_s for k in self._killer.kills if k.back_s is not None]
+        outages = [k.back_s for k in self._killer.kills if k.back_s is not None]
         total = {
             **sums_of(list(items.values()), keys),
             "not_back": sum(k.back_s is None for k in self._killer.kills),
-            "median_s": median(backs) if backs else 0.0,
-            "slowest_s": max(backs, default=0.0),
+            "median_s": median(outages) if outages else 0.0,
+            "slowest_s": max(outages, default=0.0),
             "memory_growth": _growth(self._memory),
             "memory_mb": _by_minute(self._memory),
             "watched_s": self._watched_s,
             "closing_s": closing_s,
             "exit_code": code,
-            "troubles": sum(s.troubles for s in self._streams),
-            "disk_full": self._balloon.filled,
+            "troubles": sum(s.faults for s in self._streams),
+            "disk_full": self._disk_filler.filled,
             "refused": self._receiver.refused,
-            **self._wrongs,
+            **self._fault_counts,
         }
         return {"items": items, "total": total}
 
-    def _of_camera(self, name: str) -> dict[str, Any]:
+    def _camera_results(self, name: str) -> dict[str, Any]:
         figures = self._figures.get(name, {})
         own = [k for k in self._killer.kills if k.camera == name]
         return {
-            **asdict(self._ledgers[name].account(list(self._receiver.records))),
+            **asdict(self._auditors[name].audit(list(self._receiver.records))),
             "kills": len(own),
             "slowest_s": max((k.back_s or 0.0 for k in own), default=0.0),
             "restarts": figures.get("visup_restarts_total", 0.0),

@@ -48,16 +48,16 @@ def scene(seed: int) -> list[NDArray[np.uint8]]:
     """
     rng = np.random.default_rng(seed)
     width, height = SIZE
-    ground = _texture(rng, height, width, 40, 120)
-    thing = _texture(rng, SIDE, SIDE, 130, 255)
+    background = _texture(rng, height, width, 40, 120)
+    object_texture = _texture(rng, SIDE, SIDE, 130, 255)
     top = int(rng.integers(40, height - SIDE - 40))
     frames = []
     for number in range(CROSSING + EMPTY):
-        image = ground.copy()
+        image = background.copy()
         left = round((width + SIDE) * number / CROSSING) - SIDE
         begin, end = max(0, left), min(width, left + SIDE)
         if number < CROSSING and begin < end:
-            image[top : top + SIDE, begin:end] = thing[:, begin - left : end - left]
+            image[top : top + SIDE, begin:end] = object_texture[:, begin - left : end - left]
         frames.append(image)
     return frames
 

@@ -12,13 +12,13 @@ from typing import Any
 from visup.evaluation.serving.scene import FPS
 
 BOUNDARY = "frame"
-TROUBLE_EVERY_S = 40.0
+MEAN_FAULT_INTERVAL_S = 40.0
 """Mean seconds between two faults of a camera."""
 
 STALL_S = (2.0, 8.0)
 
 
-class TroubledStream:
+class FaultyStream:
     """A network camera with faults.
 
     Args:
@@ -27,16 +27,16 @@ class TroubledStream:
 
     Attributes:
         url: Its URL.
-        troubles: Number of faults.
+        faults: Number of faults.
     """
 
     def __init__(self, pictures: Sequence[bytes], seed: int) -> None:
         self._pictures = pictures
         self._rng = random.Random(seed)  # dice, not secrets
-        self._begun = time.monotonic()
-        self._next = self._pause()
-        self._over = threading.Event()
-        self.troubles = 0
+        self._start = time.monotonic()
+        self._next_fault = self._pause()
+        self._closed = threading.Event()
+        self.faults = 0
         self._server = ThreadingHTTPServer(("127.0.0.1", 0), self._handler())
         self._server.daemon_threads = True
         self.url = f"http://127.0.0.1:{self._server.server_address[1]}/stream.mjpg"
@@ -44,34 +44,34 @@ class TroubledStream:
 
     def close(self) -> None:
         """Stop it."""
-        self._over.set()
+        self._closed.set()
         self._server.shutdown()
         self._server.server_close()
 
     def _pause(self) -> float:
-        return time.monotonic() + self._rng.expovariate(1.0 / TROUBLE_EVERY_S)
+        return time.monotonic() + self._rng.expovariate(1.0 / MEAN_FAULT_INTERVAL_S)
 
     def _send_to(self, out: Any) -> None:
         """Send frames in real time until the connection drops."""
-        while not self._over.wait(1.0 / FPS):
-            number = int((time.monotonic() - self._begun) * FPS) % len(self._pictures)
+        while not self._closed.wait(1.0 / FPS):
+            number = int((time.monotonic() - self._start) * FPS) % len(self._pictures)
             picture = self._pictures[number]
-            if time.monotonic() > self._next:
-                self._next = self._pause()
-                self.troubles += 1
-                trouble = self._rng.choice(("stall", "drop", "garbage", "cut off"))
-                if trouble == "drop":
+            if time.monotonic() > self._next_fault:
+                self._next_fault = self._pause()
+                self.faults += 1
+                fault = self._rng.choice(("stall", "drop", "garbage", "cut off"))
+                if fault == "drop":
                     return
-                if trouble == "stall":
-                    self._over.wait(self._rng.uniform(*STALL_S))
-                picture = self._spoilt(trouble, picture)
+                if fault == "stall":
+                    self._closed.wait(self._rng.uniform(*STALL_S))
+                picture = self._corrupted(fault, picture)
             head = f"--{BOUNDARY}\r\nContent-Type: image/jpeg\r\nContent-Length: {len(picture)}\r\n\r\n"
             out.write(head.encode() + picture + b"\r\n")
 
-    def _spoilt(self, trouble: str, picture: bytes) -> bytes:
-        if trouble == "garbage":
+    def _corrupted(self, fault: str, picture: bytes) -> bytes:
+        if fault == "garbage":
             return self._rng.randbytes(len(picture))
-        return picture[: len(picture) // 3] if trouble == "cut off" else picture
+        return picture[: len(picture) // 3] if fault == "cut off" else picture
 
     def _handler(self) -> type[BaseHTTPRequestHandler]:
         send_to = self._send_to
@@ -87,7 +87,7 @@ class TroubledStream:
                 except OSError:
                     self.close_connection = True
 
-            def log_message(self, *said: Any) -> None:
+            def log_message(self, *arguments: Any) -> None:
                 pass
 
         return StreamHandler

@@ -32,11 +32,11 @@ def descriptors() -> dict[str, Descriptor]:
     try:
         import mahotas.features
         import pyefd
-    except ImportError as e:
-        raise ExtraMissingError("Comparing with Zernike and Fourier descriptors", "eval") from e
+    except ImportError as error:
+        raise ExtraMissingError("Comparing with Zernike and Fourier descriptors", "eval") from error
 
     def zernike(mask: NDArray[np.bool_]) -> NDArray[np.float64]:
-        solid = _of_one_size(mask)
+        solid = _scaled_to_area(mask)
         rows, columns = np.nonzero(solid)
         middle = (float(rows.mean()), float(columns.mean()))
         radius = float(np.hypot(rows - middle[0], columns - middle[1]).max()) + 1.0
@@ -59,18 +59,18 @@ def nearest(vectors: NDArray[np.float64], query: NDArray[np.float64]) -> NDArray
     return np.argsort(np.abs(vectors - query).sum(axis=1), kind="stable")
 
 
-def _of_one_size(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _scaled_to_area(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     scale = _AREA_SIDE / max(1.0, float(np.count_nonzero(mask)) ** 0.5)
     size = tuple(max(1, round(n * scale)) for n in mask.shape[::-1])
     method = cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
-    tone = cv2.resize(mask.astype(np.float32), size, interpolation=method)
-    solid = np.asarray(tone > 0.5)
+    resized = cv2.resize(mask.astype(np.float32), size, interpolation=method)
+    solid = np.asarray(resized > 0.5)
     return solid if solid.any() else np.ones((1, 1), dtype=bool)
 
 
 def _outline(mask: NDArray[np.bool_]) -> NDArray[np.float64]:
-    found, _ = cv2.findContours(
+    outlines, _ = cv2.findContours(
         np.pad(mask, 1).astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE
     )
-    longest = max(found, key=len)
+    longest = max(outlines, key=len)
     return np.asarray(longest[:, 0], dtype=np.float64)

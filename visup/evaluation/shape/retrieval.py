@@ -35,7 +35,7 @@ RANKS = 10
 """Number of ranks in the rank table."""
 
 _PROCESSES = 2
-_ROWS = 20
+_ROWS_PER_TASK = 20
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,7 +44,7 @@ class _Rows:
 
     rows: list[int]
     graphs: list[NDArray[np.float64]]
-    looks: list[NDArray[np.float64]]
+    outlines: list[NDArray[np.float64]]
     seconds: float
 
 
@@ -67,42 +67,44 @@ def evaluate_shapes(
     Raises:
         SettingsError: There are no classes with at least two shapes in all.
     """
-    labels, files = _listed(folder, limit)
+    labels, files = _list_images(folder, limit)
     shapes, ms_shape = _shapes(files, progress)
-    graphs, looks, ms_pair = _similarities(shapes, progress)
-    both = GRAPH_SHARE * graphs + looks
-    np.fill_diagonal(both, 1.0)
-    compared, lost = _pruning(shapes, both)
-    items = _figures(both, labels)
-    alone = _figures(graphs, labels)
+    graphs, outlines, ms_pair = _similarities(shapes, progress)
+    similarities = GRAPH_SHARE * graphs + outlines
+    np.fill_diagonal(similarities, 1.0)
+    compared, lost = _prune(shapes, similarities)
+    items = _figures(similarities, labels)
+    graph_alone = _figures(graphs, labels)
     for name, figures in items.items():
-        figures["graph_alone"] = alone[name]
+        figures["graph_alone"] = graph_alone[name]
         own = labels == name if name else np.ones(len(labels), dtype=bool)
         figures["compared"], figures["lost"] = float(compared[own].mean()), float(lost[own].mean())
     total = items.pop("")
     return {"total": {**total, "ms_shape": ms_shape, "ms_pair": ms_pair}, "items": items}
 
 
-def _listed(folder: Path, limit: int | None) -> tuple[NDArray[np.str_], list[Path]]:
+def _list_images(folder: Path, limit: int | None) -> tuple[NDArray[np.str_], list[Path]]:
     """Classes and image files by name."""
-    found = [
-        (sub.name, file)
-        for sub in sorted(p for p in folder.iterdir() if p.is_dir())
-        for file in sorted(f for f in sub.iterdir() if f.suffix.lower() in IMAGE_SUFFIXES)[:limit]
+    images = [
+        (class_folder.name, file)
+        for class_folder in sorted(p for p in folder.iterdir() if p.is_dir())
+        for file in sorted(f for f in class_folder.iterdir() if f.suffix.lower() in IMAGE_SUFFIXES)[
+            :limit
+        ]
     ]
-    if len(found) < 2:
+    if len(images) < 2:
         raise SettingsError(
             "there are no shapes to compare here",
             where=str(folder),
             expected="<class>/*.png with at least two pictures",
         )
-    return np.array([name for name, _ in found]), [file for _, file in found]
+    return np.array([name for name, _ in images]), [file for _, file in images]
 
 
 def _shapes(files: Sequence[Path], progress: Progress) -> tuple[list[Shape], float]:
     """Shapes of all images, and milliseconds per shape from mask to shock graph."""
     progress(f"{len(files)} silhouettes")
-    spent, shapes = [], []
+    seconds, shapes = [], []
     for file in files:
         mask = read_silhouette(file)
         begin = time.perf_counter()
@@ -110,8 +112,8 @@ def _shapes(files: Sequence[Path], progress: Progress) -> tuple[list[Shape], flo
         if silhouette is None:
             raise SettingsError("this picture shows no shape", where=str(file))
         shapes.append(shape_of(silhouette))
-        spent.append(time.perf_counter() - begin)
-    return shapes, 1e3 * float(np.median(spent))
+        seconds.append(time.perf_counter() - begin)
+    return shapes, 1e3 * float(np.median(seconds))
 
 
 def _similarities(
@@ -119,17 +121,17 @@ def _similarities(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
     """Graph similarities of all pairs, the contribution of outlines and areas, and milliseconds per pair."""
     size = len(shapes)
-    graphs, looks = np.eye(size), np.eye(size)
-    begins = list(range(1, size, _ROWS))
+    graphs, outlines = np.eye(size), np.eye(size)
+    begins = list(range(1, size, _ROWS_PER_TASK))
     seconds = 0.0
     with worker_pool(_PROCESSES, _set_shapes, shapes) as pool:
-        for done in pool.map(_compare_rows, begins):
-            seconds += done.seconds
-            for i, g, o in zip(done.rows, done.graphs, done.looks, strict=True):
+        for batch in pool.map(_compare_rows, begins):
+            seconds += batch.seconds
+            for i, g, o in zip(batch.rows, batch.graphs, batch.outlines, strict=True):
                 graphs[i, :i] = graphs[:i, i] = g
-                looks[i, :i] = looks[:i, i] = o
-            progress(f"{done.rows[-1] + 1} of {size} queries")
-    return graphs, looks, 1e3 * seconds / (size * (size - 1) / 2)
+                outlines[i, :i] = outlines[:i, i] = o
+            progress(f"{batch.rows[-1] + 1} of {size} queries")
+    return graphs, outlines, 1e3 * seconds / (size * (size - 1) / 2)
 
 
 class _Shared:
@@ -150,10 +152,10 @@ def _set_shapes(shapes: list[Shape]) -> None:
 
 def _compare_rows(begin: int) -> _Rows:
     start = time.perf_counter()
-    rows = list(range(begin, min(begin + _ROWS, len(_Shared.shapes))))
+    rows = list(range(begin, min(begin + _ROWS_PER_TASK, len(_Shared.shapes))))
     graphs = [_graph_row(i) for i in rows]
-    looks = [_looks_row(i) for i in rows]
-    return _Rows(rows, graphs, looks, time.perf_counter() - start)
+    outlines = [_outline_row(i) for i in rows]
+    return _Rows(rows, graphs, outlines, time.perf_counter() - start)
 
 
 def _graph_row(i: int) -> NDArray[np.float64]:
@@ -170,26 +172,26 @@ def _graph_row(i: int) -> NDArray[np.float64]:
     return out
 
 
-def _looks_row(i: int) -> NDArray[np.float64]:
+def _outline_row(i: int) -> NDArray[np.float64]:
     """The contribution of outlines and areas to the similarities of one shape with all previous ones."""
     query = _Shared.shapes[i]
     overlaps = _Shared.areas.overlaps(query.areas, np.arange(i))
     return compare_outlines_and_areas(query, _Shared.shapes[:i], overlaps).partial_similarity
 
 
-def _pruning(
-    shapes: list[Shape], both: NDArray[np.float64]
+def _prune(
+    shapes: list[Shape], similarities: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """For each query the share of the others that passes the index, and 1 if the best is lost."""
     index = ViewIndex(shapes)
-    everyone = np.arange(len(shapes))
-    most = candidate_count(len(shapes) - 1)
+    indices = np.arange(len(shapes))
+    limit = candidate_count(len(shapes) - 1)
     compared, lost = np.zeros(len(shapes)), np.zeros(len(shapes))
     for i, shape in enumerate(shapes):
-        others = everyone[everyone != i]
-        found = index.candidates(shape, others, most).numbers
+        others = indices[indices != i]
+        found = index.candidates(shape, others, limit).numbers
         compared[i] = len(found) / len(others)
-        lost[i] = float(others[int(np.argmax(both[i, others]))] not in found)
+        lost[i] = float(others[int(np.argmax(similarities[i, others]))] not in found)
     return compared, lost
 
 
@@ -200,13 +202,13 @@ def _figures(
     hits, bullseye = np.zeros((len(labels), RANKS), dtype=int), np.zeros(len(labels))
     for i, label in enumerate(labels):
         order = np.argsort(-similarity[i], kind="stable")
-        size = int((labels == label).sum())
+        class_size = int((labels == label).sum())
         # The query itself is among its best matches; ties must not displace it.
         others = order[order != i]
         ranked = labels[others[:RANKS]] == label
         hits[i, : len(ranked)] = ranked
-        best = np.concatenate([[i], others])[: 2 * size]
-        bullseye[i] = (labels[best] == label).sum() / size
+        retrieved = np.concatenate([[i], others])[: 2 * class_size]
+        bullseye[i] = (labels[retrieved] == label).sum() / class_size
     groups = {
         "": np.ones(len(labels), dtype=bool),
         **{str(c): labels == c for c in np.unique(labels)},

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 POINTS = 20_000
 """Surface points for comparison."""
 
-MOVED = 300
+MOVED_POINTS = 300
 """Surface points that are transformed."""
 
 TOLERANCE = 0.008
@@ -27,7 +27,7 @@ FOLDS = (2, 3, 4, 5, 6, 8)
 """Orders of rotational symmetries to test."""
 
 _STEP_DEG = 5.0
-_ODD_DEG = (37.0, 73.0, 101.0)
+_GENERIC_ANGLES_DEG = (37.0, 73.0, 101.0)
 
 
 def silhouette_symmetries(mesh: Any, seed: int = 0) -> NDArray[np.float64]:
@@ -45,11 +45,11 @@ def silhouette_symmetries(mesh: Any, seed: int = 0) -> NDArray[np.float64]:
         (S, 3, 3) float64 proper rotations of direction vectors, mesh frame; the identity is first.
     """
     points = _surface(mesh, seed)
-    looks = _SurfaceComparison(points)
+    comparison = _SurfaceComparison(points)
     axes = np.vstack([np.eye(3), np.linalg.eigh(points.T @ points)[1].T])
-    moves = [m for axis in axes for m in _symmetries_of(axis, axes, looks)]
+    symmetries = [m for axis in axes for m in _symmetries_of(axis, axes, comparison)]
     # Point reflection mirrors the silhouette: with a reflection it gives a proper rotation.
-    return np.stack([np.eye(3), *(m if np.linalg.det(m) > 0 else -m for m in moves)])
+    return np.stack([np.eye(3), *(m if np.linalg.det(m) > 0 else -m for m in symmetries)])
 
 
 def angle_to(
@@ -62,8 +62,8 @@ def angle_to(
         true: (3,) unit vector.
         symmetries: (S, 3, 3), see `silhouette_symmetries`.
     """
-    alike = symmetries @ true
-    return float(np.degrees(np.arccos(np.clip((alike @ direction).max(), -1.0, 1.0))))
+    equivalent = symmetries @ true
+    return float(np.degrees(np.arccos(np.clip((equivalent @ direction).max(), -1.0, 1.0))))
 
 
 def _surface(mesh: Any, seed: int) -> NDArray[np.float64]:
@@ -74,9 +74,9 @@ def _surface(mesh: Any, seed: int) -> NDArray[np.float64]:
     rng = np.random.default_rng(seed)
     chosen = triangles[rng.choice(len(triangles), POINTS, p=area / area.sum())]
     u, v = np.sqrt(rng.random((POINTS, 1))), rng.random((POINTS, 1))
-    spots = (1 - u) * chosen[:, 0] + u * (1 - v) * chosen[:, 1] + u * v * chosen[:, 2]
-    spots = spots - spots.mean(axis=0)
-    return np.asarray(spots / np.linalg.norm(spots, axis=1).max())
+    points = (1 - u) * chosen[:, 0] + u * (1 - v) * chosen[:, 1] + u * v * chosen[:, 2]
+    points = points - points.mean(axis=0)
+    return np.asarray(points / np.linalg.norm(points, axis=1).max())
 
 
 class _SurfaceComparison:
@@ -84,42 +84,46 @@ class _SurfaceComparison:
 
     def __init__(self, points: NDArray[np.float64]) -> None:
         self._tree = cKDTree(points)
-        self._few = points[:: POINTS // MOVED]
+        self._sample = points[:: POINTS // MOVED_POINTS]
         # Sampling distance of the points: the least distance even for a perfect symmetry.
-        self._grain = float(self._tree.query(self._few, k=2)[0][:, 1].mean())
+        self._spacing = float(self._tree.query(self._sample, k=2)[0][:, 1].mean())
 
-    def change(self, move: NDArray[np.float64]) -> float:
+    def distance(self, move: NDArray[np.float64]) -> float:
         """Mean distance of the transformed surface from itself."""
-        distance, _ = self._tree.query(self._few @ move.T)
-        return float(distance.mean()) - self._grain
+        distances, _ = self._tree.query(self._sample @ move.T)
+        return float(distances.mean()) - self._spacing
 
-    def same(self, move: NDArray[np.float64]) -> bool:
-        return self.change(move) < TOLERANCE
+    def is_symmetry(self, move: NDArray[np.float64]) -> bool:
+        return self.distance(move) < TOLERANCE
 
 
 def _symmetries_of(
-    axis: NDArray[np.float64], axes: NDArray[np.float64], looks: _SurfaceComparison
+    axis: NDArray[np.float64], axes: NDArray[np.float64], comparison: _SurfaceComparison
 ) -> list[NDArray[np.float64]]:
     """Rotations about an axis, and reflections in planes through it or perpendicular to it."""
-    round_about = all(looks.same(_turn(axis, d)) for d in _ODD_DEG)
-    upright = [_mirror(axis)] if looks.same(_mirror(axis)) else []
+    is_revolution = all(comparison.is_symmetry(_rotation(axis, d)) for d in _GENERIC_ANGLES_DEG)
+    axial_mirror = [_mirror(axis)] if comparison.is_symmetry(_mirror(axis)) else []
     mirrors = [_mirror(n) for n in _normals(axis, axes)]
-    if round_about:
-        turns = [_turn(axis, d) for d in np.arange(_STEP_DEG, 360.0, _STEP_DEG)]
-        return [*turns, *upright, *mirrors]
-    turns = [m for m in _fold_turns(axis) if looks.same(m)]
-    changes = np.array([looks.change(m) for m in mirrors])
+    if is_revolution:
+        rotations = [_rotation(axis, d) for d in np.arange(_STEP_DEG, 360.0, _STEP_DEG)]
+        return [*rotations, *axial_mirror, *mirrors]
+    rotations = [m for m in _fold_rotations(axis) if comparison.is_symmetry(m)]
+    distances = np.array([comparison.distance(m) for m in mirrors])
     # Planes next to a plane of symmetry are almost as good: only local minima count.
-    least = (changes <= np.roll(changes, 1)) & (changes <= np.roll(changes, -1))
-    return [*turns, *upright, *(mirrors[k] for k in np.flatnonzero(least & (changes < TOLERANCE)))]
+    is_minimum = (distances <= np.roll(distances, 1)) & (distances <= np.roll(distances, -1))
+    return [
+        *rotations,
+        *axial_mirror,
+        *(mirrors[k] for k in np.flatnonzero(is_minimum & (distances < TOLERANCE))),
+    ]
 
 
-def _fold_turns(axis: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+def _fold_rotations(axis: NDArray[np.float64]) -> list[NDArray[np.float64]]:
     degrees = {360.0 * k / fold for fold in FOLDS for k in range(1, fold)}
-    return [_turn(axis, d) for d in sorted(degrees)]
+    return [_rotation(axis, d) for d in sorted(degrees)]
 
 
-def _turn(axis: NDArray[np.float64], degrees: float) -> NDArray[np.float64]:
+def _rotation(axis: NDArray[np.float64], degrees: float) -> NDArray[np.float64]:
     return np.asarray(Rotation.from_rotvec(axis * np.radians(degrees)).as_matrix())
 
 
@@ -132,5 +136,5 @@ def _normals(axis: NDArray[np.float64], axes: NDArray[np.float64]) -> list[NDArr
     others = axes - np.outer(axes @ axis, axis)
     side = others[int(np.argmax(np.linalg.norm(others, axis=1)))]
     side = side / np.linalg.norm(side)
-    turns = np.radians(np.arange(0.0, 180.0, _STEP_DEG))
-    return [np.asarray(Rotation.from_rotvec(axis * t).apply(side)) for t in turns]
+    angles = np.radians(np.arange(0.0, 180.0, _STEP_DEG))
+    return [np.asarray(Rotation.from_rotvec(axis * t).apply(side)) for t in angles]

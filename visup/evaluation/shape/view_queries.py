@@ -31,7 +31,7 @@ NOISE_LENGTH = 0.015
 CUT_SHARE = 0.15
 """Share of the area that lies beyond the border."""
 
-_DRAWN = 400
+_RENDER_PX = 400
 _MARGIN = 6
 
 
@@ -65,14 +65,14 @@ def draw_queries(name: str, mesh: Any, count: int, seed: int) -> list[Query]:
     rng = np.random.default_rng([seed, *name.encode()])
     directions = rng.normal(size=(count, 3))
     directions /= np.linalg.norm(directions, axis=1)[:, None]
-    seen = render_views(mesh, directions, _DRAWN)
-    return [Query(name, v.direction, _conditions(v.mask, rng)) for v in seen]
+    views = render_views(mesh, directions, _RENDER_PX)
+    return [Query(name, v.direction, _conditions(v.mask, rng)) for v in views]
 
 
 def _conditions(mask: NDArray[np.bool_], rng: np.random.Generator) -> dict[str, NDArray[np.bool_]]:
     size, roll = rng.uniform(*SIZES), rng.uniform(0.0, 2 * np.pi)
     side = int(rng.integers(4))
-    clean = turned_and_scaled(mask, roll, size)
+    clean = rotated_and_scaled(mask, roll, size)
     noisy = with_contour_noise(clean, NOISE * size, NOISE_LENGTH * size, rng)
     return {
         "clean": clean,
@@ -82,7 +82,7 @@ def _conditions(mask: NDArray[np.bool_], rng: np.random.Generator) -> dict[str, 
     }
 
 
-def turned_and_scaled(mask: NDArray[np.bool_], roll: float, size: float) -> NDArray[np.bool_]:
+def rotated_and_scaled(mask: NDArray[np.bool_], roll: float, size: float) -> NDArray[np.bool_]:
     """A silhouette rotated in the image plane and scaled to a size.
 
     Args:
@@ -94,16 +94,16 @@ def turned_and_scaled(mask: NDArray[np.bool_], roll: float, size: float) -> NDAr
         (N, N) bool with a margin on all sides.
     """
     rows, columns = np.nonzero(mask)
-    turn = np.array([[np.cos(roll), -np.sin(roll)], [np.sin(roll), np.cos(roll)]])
-    spots = np.stack([columns, rows], axis=1) @ turn.T
-    low, high = spots.min(axis=0), spots.max(axis=0)
+    rotation = np.array([[np.cos(roll), -np.sin(roll)], [np.sin(roll), np.cos(roll)]])
+    points = np.stack([columns, rows], axis=1) @ rotation.T
+    low, high = points.min(axis=0), points.max(axis=0)
     scale = size / (float((high - low).max()) + 1.0)
     side = int(np.ceil(size)) + 2 * _MARGIN
-    move = side / 2 - scale * (low + high) / 2
-    sharp = mask.astype(np.float32)
-    tone = cv2.GaussianBlur(sharp, (0, 0), 0.5 / scale) if scale < 1 else sharp
-    warp = np.hstack([scale * turn, move[:, None]])
-    return np.asarray(cv2.warpAffine(tone, warp, (side, side), flags=cv2.INTER_LINEAR) > 0.5)
+    shift = side / 2 - scale * (low + high) / 2
+    grey = mask.astype(np.float32)
+    smooth = cv2.GaussianBlur(grey, (0, 0), 0.5 / scale) if scale < 1 else grey
+    warp = np.hstack([scale * rotation, shift[:, None]])
+    return np.asarray(cv2.warpAffine(smooth, warp, (side, side), flags=cv2.INTER_LINEAR) > 0.5)
 
 
 def with_contour_noise(
@@ -128,9 +128,9 @@ def with_contour_noise(
     solid = padded.astype(np.uint8)
     inside = cv2.distanceTransform(solid, cv2.DIST_L2, 5) - 0.5
     outside = cv2.distanceTransform(1 - solid, cv2.DIST_L2, 5) - 0.5
-    depth = np.where(padded, inside, -outside)
+    signed_distance = np.where(padded, inside, -outside)
     field = gaussian_filter(rng.normal(size=padded.shape), length, mode="wrap")
-    noisy = depth > field * (2 * np.sqrt(np.pi) * length * sigma)
+    noisy = signed_distance > field * (2 * np.sqrt(np.pi) * length * sigma)
     return np.asarray(noisy if noisy.any() else padded)
 
 
@@ -145,7 +145,7 @@ def cut_by_border(mask: NDArray[np.bool_], share: float, side: int) -> NDArray[n
     Returns:
         The remaining mask; one side of the array is the border.
     """
-    turned = np.rot90(mask, side)
-    sums = np.cumsum(np.count_nonzero(turned, axis=0))
+    rotated = np.rot90(mask, side)
+    sums = np.cumsum(np.count_nonzero(rotated, axis=0))
     first = int(np.searchsorted(sums, share * sums[-1]))
-    return np.rot90(turned[:, first:], -side).copy()
+    return np.rot90(rotated[:, first:], -side).copy()

@@ -27,7 +27,7 @@ from visup.percepts.shape.building.mesh_views import half_sphere_directions, loa
 from visup.percepts.shape.database.model_database import ModelDatabase, ViewMatch
 from visup.rules.identity.votes import VoteSettings
 
-STRANGER = VoteSettings().unknown_similarity
+UNKNOWN_SIMILARITY = VoteSettings().unknown_similarity
 """Similarity above which a name gets more votes than "none of the models"."""
 
 TOP = 5
@@ -51,7 +51,7 @@ class _QueryResult:
     other: float
 
 
-class DrawnQueries(TypedDict, total=False):
+class QuerySettings(TypedDict, total=False):
     """Settings of the queries.
 
     Attributes:
@@ -70,7 +70,7 @@ def evaluate_views(
     limit: int | None = None,
     machines: bool = False,
     progress: Progress = silent,
-    **drawn: Unpack[DrawnQueries],
+    **query_settings: Unpack[QuerySettings],
 ) -> dict[str, Any]:
     """Figures of recognising meshes from unseen directions.
 
@@ -80,7 +80,7 @@ def evaluate_views(
         limit: Maximum meshes of the folder; all by default.
         machines: Whether to add the generated machines (`render/meshes/machines.py`).
         progress: Shows what is being done.
-        drawn: Settings of the queries.
+        query_settings: Settings of the queries.
 
     Returns:
         {"total": {...}, "items": {mesh: {...}}}: for each of `clean`, `noise`, `cut` and `both`, `top1`
@@ -96,11 +96,11 @@ def evaluate_views(
         SettingsError: There are no meshes, or a number is out of range.
         ExtraMissingError: The mesh renderer or the baselines are not installed.
     """
-    queries, seed = drawn.get("queries", 12), drawn.get("seed", 0)
+    queries, seed = query_settings.get("queries", 12), query_settings.get("seed", 0)
     if views < 1 or queries < 1:
         raise SettingsError("views and queries are counted from 1", expected="at least 1 of each")
-    meshes = _listed(folder, limit)
-    others = descriptors()
+    meshes = _mesh_files(folder, limit)
+    baseline_descriptors = descriptors()
     with tempfile.TemporaryDirectory() as scratch:
         meshes += _machines(Path(scratch)) if machines else []
         progress(f"views of {len(meshes)} meshes")
@@ -109,16 +109,16 @@ def evaluate_views(
             Path(scratch) / "views.models", meshes, views=views, jobs=os.cpu_count() or 1
         )
         rate = len(meshes) * views / (time.perf_counter() - begin)
-        asked = list(_asked(meshes, queries, seed, progress))
-        answers = [a for query, alike in asked for a in _answers(database, query, alike)]
+        drawn = list(_queries_with_symmetries(meshes, queries, seed, progress))
+        results = [a for query, alike in drawn for a in _query_results(database, query, alike)]
         progress("other descriptors")
-        baseline = _baselines(others, meshes, views, [query for query, _ in asked])
-    items = {m.stem: _figures([a for a in answers if a.name == m.stem]) for m in meshes}
-    total = {**_figures(answers), "build_views_per_s": rate, "baseline": baseline}
+        baseline = _baselines(baseline_descriptors, meshes, views, [query for query, _ in drawn])
+    items = {m.stem: _figures([a for a in results if a.name == m.stem]) for m in meshes}
+    total = {**_figures(results), "build_views_per_s": rate, "baseline": baseline}
     return {"total": total, "items": items}
 
 
-def _listed(folder: Path, limit: int | None) -> list[Path]:
+def _mesh_files(folder: Path, limit: int | None) -> list[Path]:
     found = sorted(p for p in folder.iterdir() if p.suffix.lower() in MESHES)[:limit]
     if not found:
         raise SettingsError(
@@ -137,20 +137,20 @@ def _machines(folder: Path) -> list[Path]:
     return write_meshes(MACHINES, folder)
 
 
-def _asked(
+def _queries_with_symmetries(
     meshes: Sequence[Path], queries: int, seed: int, progress: Progress
 ) -> Iterator[tuple[Query, NDArray[np.float64]]]:
     """All queries with the symmetries of their objects."""
     for path in meshes:
         progress(f"{path.stem}: {queries} queries")
         mesh = load_mesh(path)
-        alike = silhouette_symmetries(mesh)
+        symmetries = silhouette_symmetries(mesh)
         for query in draw_queries(path.stem, mesh, queries, seed):
-            yield query, alike
+            yield query, symmetries
 
 
-def _answers(
-    database: ModelDatabase, query: Query, alike: NDArray[np.float64]
+def _query_results(
+    database: ModelDatabase, query: Query, symmetries: NDArray[np.float64]
 ) -> Iterator[_QueryResult]:
     """One query in all conditions."""
     for condition in CONDITIONS:
@@ -159,62 +159,67 @@ def _answers(
         ranking = database.query(mask, cut=cut, top=TOP, per_name=1)
         seconds = time.perf_counter() - begin
         names = [m.view.name for m in ranking.matches]
-        own = database.query(mask, cut=cut, top=1, restrict={query.name}).matches
+        matches = database.query(mask, cut=cut, top=1, restrict={query.name}).matches
         yield _QueryResult(
             query.name,
             condition,
             names.index(query.name) if query.name in names else None,
-            _angle(own, query, alike),
+            _angle(matches, query, symmetries),
             seconds,
             ranking.compared / len(database.views),
-            own[0].similarity if own else 0.0,
+            matches[0].similarity if matches else 0.0,
             max((m.similarity for m in ranking.matches if m.view.name != query.name), default=0.0),
         )
 
 
-def _angle(own: Sequence[ViewMatch], query: Query, alike: NDArray[np.float64]) -> float | None:
-    if not own or own[0].direction is None:
+def _angle(
+    matches: Sequence[ViewMatch], query: Query, symmetries: NDArray[np.float64]
+) -> float | None:
+    if not matches or matches[0].direction is None:
         return None
-    return angle_to(np.asarray(own[0].direction), query.direction, alike)
+    return angle_to(np.asarray(matches[0].direction), query.direction, symmetries)
 
 
-def _figures(answers: Sequence[_QueryResult]) -> dict[str, Any]:
+def _figures(results: Sequence[_QueryResult]) -> dict[str, Any]:
     figures: dict[str, Any] = {}
     for condition in CONDITIONS:
-        own = [a for a in answers if a.condition == condition]
+        own = [a for a in results if a.condition == condition]
         angles = [a.angle for a in own if a.angle is not None]
         figures[condition] = {
             "top1": float(np.mean([a.rank == 0 for a in own])),
             "top5": float(np.mean([a.rank is not None for a in own])),
             "angle_deg": float(np.median(angles)) if angles else None,
-            "known_told": float(np.mean([a.own >= STRANGER for a in own])),
-            "stranger_told": float(np.mean([a.other >= STRANGER for a in own])),
+            "known_told": float(np.mean([a.own >= UNKNOWN_SIMILARITY for a in own])),
+            "stranger_told": float(np.mean([a.other >= UNKNOWN_SIMILARITY for a in own])),
             "ms": 1e3 * float(np.median([a.seconds for a in own])),
         }
     figures["ms_query"] = float(np.mean([figures[c]["ms"] for c in CONDITIONS]))
-    figures["compared"] = float(np.mean([a.compared for a in answers]))
+    figures["compared"] = float(np.mean([a.compared for a in results]))
     return figures
 
 
 def _baselines(
-    others: dict[str, Descriptor], meshes: Sequence[Path], views: int, asked: Sequence[Query]
+    descriptors_by_name: dict[str, Descriptor],
+    meshes: Sequence[Path],
+    views: int,
+    queries: Sequence[Query],
 ) -> dict[str, dict[str, float]]:
     """Share of queries whose nearest view, by each baseline descriptor, is of the right object."""
-    seen = [
+    known_views = [
         (path.stem, v.mask)
         for path in meshes
         for v in render_views(load_mesh(path), half_sphere_directions(views))
     ]
-    names = [name for name, _ in seen]
+    names = [name for name, _ in known_views]
     table: dict[str, dict[str, float]] = {}
-    for name, describe in others.items():
-        known = np.stack([describe(mask) for _, mask in seen])
+    for name, describe in descriptors_by_name.items():
+        vectors = np.stack([describe(mask) for _, mask in known_views])
         table[name] = {
             condition: float(
                 np.mean(
                     [
-                        names[nearest(known, describe(q.masks[condition]))[0]] == q.name
-                        for q in asked
+                        names[nearest(vectors, describe(q.masks[condition]))[0]] == q.name
+                        for q in queries
                     ]
                 )
             )

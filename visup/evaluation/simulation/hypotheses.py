@@ -20,7 +20,17 @@ from visup.evaluation.simulation.truth_masks import Mission
 from visup.evaluation.simulation.view_noise import NoisyViews, ViewNoise
 from visup.percepts.shape.building.mesh_views import half_sphere_directions
 
-ABSENT = ("antenna", "barrel", "chair", "drill", "engine", "funnel", "guitar", "hammer", "iron")
+ABSENT_MODELS = (
+    "antenna",
+    "barrel",
+    "chair",
+    "drill",
+    "engine",
+    "funnel",
+    "guitar",
+    "hammer",
+    "iron",
+)
 """Models that are in no mission, for confusions."""
 
 VIEWS = 32
@@ -29,8 +39,8 @@ VIEWS = 32
 # Wrong names and looks without a name are chosen here: views have only their own noise.
 _NOISE = ViewNoise(missing=0.0, wrong=0.0)
 _DIRECTIONS = half_sphere_directions(VIEWS)
-_PERSISTS = 0.7  # probability that a wrong name persists within a run of wrong names
-_TOLD = 4  # names reported each time
+_PERSISTENCE = 0.7  # probability that a wrong name persists within a run of wrong names
+_NAMES_PER_REPORT = 4  # names reported each time
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,17 +76,17 @@ class HypothesisSource:
         self._frames, self._name, self._size = mission.truth["frames"], name, mission.size
         self._fov = np.deg2rad(float(mission.description.get("fov_vertical_deg", 40.0)))
         self.model = str(mission.truth["meshes"].get(name, name))
-        others = {*mission.truth["meshes"].values(), *ABSENT} - {self.model}
+        others = {*mission.truth["meshes"].values(), *ABSENT_MODELS} - {self.model}
         self._others = [str(o) for o in rng.permutation(sorted(others))]
-        self._odds = 1.0 / np.arange(1, len(self._others) + 1)
-        self._odds /= self._odds.sum()
-        self._end = 1.0 / noise.run
+        self._probabilities = 1.0 / np.arange(1, len(self._others) + 1)
+        self._probabilities /= self._probabilities.sum()
+        self._end_probability = 1.0 / noise.run
         self._noise, self._rng = noise, rng
         self._views = NoisyViews(self.model, _DIRECTIONS, _NOISE, rng)
-        self._mistaken: str | None = None
-        self._off = 0.0
+        self._wrong_name: str | None = None
+        self._depth_error = 0.0
 
-    def says(
+    def report(
         self, region: Region, index: int, *, alone: bool = True
     ) -> Iterator[Hypothesis | Depth]:
         """The hypotheses and depth of the object's region in one frame.
@@ -92,30 +102,35 @@ class HypothesisSource:
         for name in names:
             yield from self._hypotheses(region, name, min(similarity, 0.99), true)
             similarity -= 0.01 + abs(0.05 + 0.03 * self._rng.standard_normal())
-        self._off = 0.7 * self._off + 0.7 * self._rng.standard_normal()
+        self._depth_error = 0.7 * self._depth_error + 0.7 * self._rng.standard_normal()
         if true.get("range_m") and not region.cut and alone and self.model in names:
-            far = float(true["range_m"]) * (1 + self._noise.depth * self._off)
-            yield Depth(region.id, self.model, far, self._noise.depth * far)
+            depth = float(true["range_m"]) * (1 + self._noise.depth * self._depth_error)
+            yield Depth(region.id, self.model, depth, self._noise.depth * depth)
 
     def _names(self, wrong: float) -> list[str]:
         rng = self._rng
-        begin = self._end * wrong / max(1.0 - wrong, 1e-9)
-        if self._mistaken is None and rng.random() < begin:
-            self._mistaken = self._other()
-        elif self._mistaken is not None and rng.random() < self._end:
-            self._mistaken = None
-        elif self._mistaken is not None and rng.random() > _PERSISTS:
-            self._mistaken = self._other()
-        rest = [str(o) for o in rng.choice(self._others, _TOLD, replace=False, p=self._odds)]
-        if self._mistaken is None:
-            return [self.model, *rest[: _TOLD - 1]]
-        rest = [n for n in rest if n != self._mistaken][: _TOLD - 1]
+        begin_probability = self._end_probability * wrong / max(1.0 - wrong, 1e-9)
+        if self._wrong_name is None and rng.random() < begin_probability:
+            self._wrong_name = self._random_other()
+        elif self._wrong_name is not None and rng.random() < self._end_probability:
+            self._wrong_name = None
+        elif self._wrong_name is not None and rng.random() > _PERSISTENCE:
+            self._wrong_name = self._random_other()
+        rest = [
+            str(o)
+            for o in rng.choice(
+                self._others, _NAMES_PER_REPORT, replace=False, p=self._probabilities
+            )
+        ]
+        if self._wrong_name is None:
+            return [self.model, *rest[: _NAMES_PER_REPORT - 1]]
+        rest = [n for n in rest if n != self._wrong_name][: _NAMES_PER_REPORT - 1]
         if rng.random() < self._noise.listed:
             rest[int(rng.integers(len(rest)))] = self.model
-        return [self._mistaken, *rest]
+        return [self._wrong_name, *rest]
 
-    def _other(self) -> str:
-        return str(self._rng.choice(self._others, p=self._odds))
+    def _random_other(self) -> str:
+        return str(self._rng.choice(self._others, p=self._probabilities))
 
     def _hypotheses(
         self, region: Region, name: str, similarity: float, true: Mapping[str, Any]
@@ -131,12 +146,12 @@ class HypothesisSource:
             view = int(self._rng.integers(VIEWS))
             yield Hypothesis(region.id, name, view % 8, similarity)
         else:
-            said = self._views(self._seen(true), region.id)
-            for h in said:
-                alike = max(0.0, similarity - said[0].similarity + h.similarity)
-                yield replace(h, similarity=alike)
+            hypotheses = self._views(self._apparent_orientation(true), region.id)
+            for h in hypotheses:
+                adjusted = max(0.0, similarity - hypotheses[0].similarity + h.similarity)
+                yield replace(h, similarity=adjusted)
 
-    def _seen(self, true: Mapping[str, Any]) -> NDArray[np.float64]:
+    def _apparent_orientation(self, true: Mapping[str, Any]) -> NDArray[np.float64]:
         """Apparent orientation (3, 3): relative to the line of sight, not the optical axis."""
         from scipy.spatial.transform import Rotation
 
@@ -145,11 +160,11 @@ class HypothesisSource:
         width, height = self._size
         focal = height / 2 / np.tan(self._fov / 2)
         ray = np.array([x + w / 2 - width / 2, y + h / 2 - height / 2, focal])
-        turned = Rotation.from_quat(true["quat_xyzw"])
+        orientation = Rotation.from_quat(true["quat_xyzw"])
         # Smallest rotation that takes the line of sight to the optical axis.
-        across = np.cross(ray, [0.0, 0.0, 1.0])
-        sine = float(np.linalg.norm(across))
+        axis = np.cross(ray, [0.0, 0.0, 1.0])
+        sine = float(np.linalg.norm(axis))
         if sine < 1e-9:
-            return np.asarray(turned.as_matrix())
-        aside = Rotation.from_rotvec(across / sine * np.arctan2(sine, ray[2]))
-        return np.asarray((aside * turned).as_matrix())
+            return np.asarray(orientation.as_matrix())
+        correction = Rotation.from_rotvec(axis / sine * np.arctan2(sine, ray[2]))
+        return np.asarray((correction * orientation).as_matrix())

@@ -30,7 +30,7 @@ from visup.agent import (
 from visup.agent.contract.behaviour import Behaviour, Contract
 from visup.agent.execution.pipeline import ordered_slots, perceive
 from visup.evaluation.simulation.hypotheses import HypothesisSource, NamingNoise
-from visup.evaluation.simulation.truth_masks import ContourNoise, Mission, shaken
+from visup.evaluation.simulation.truth_masks import ContourNoise, Mission, displaced_distance
 from visup.testing import region_of
 
 CONFIDENCE = 0.9
@@ -57,7 +57,7 @@ class PerceptNoise:
         listed: Probability that the right name is among the others if the first one is wrong.
         depth: Relative standard deviation of depth.
         names_every_s: Least time between two reports of names, seconds.
-        least_px: Least visible area of an object for a region, pixels.
+        min_visible_px: Least visible area of an object for a region, pixels.
         fresh_id_s: Time without a region after which a tracker assigns a new id, seconds.
         merge_coupled: Whether the regions of coupled objects merge, as in motion segmentation of objects that
             move alike.
@@ -78,7 +78,7 @@ class PerceptNoise:
     listed: float = 0.7
     depth: float = 0.03
     names_every_s: float = 0.2
-    least_px: int = 150
+    min_visible_px: int = 150
     fresh_id_s: float = 0.8
     merge_coupled: bool = False
 
@@ -94,17 +94,19 @@ class Dropouts:
 
     def __init__(self, noise: PerceptNoise, dt: float, rng: np.random.Generator) -> None:
         share = noise.missing * noise.in_bursts
-        self._end = min(1.0, dt / noise.burst_s)
-        self._begin = self._end * share / max(1.0 - share, 1e-9)
-        self._alone = (noise.missing - share) / max(1.0 - share, 1e-9)
+        self._end_probability = min(1.0, dt / noise.burst_s)
+        self._begin_probability = self._end_probability * share / max(1.0 - share, 1e-9)
+        self._single_probability = (noise.missing - share) / max(1.0 - share, 1e-9)
         self._rng = rng
-        self._within = rng.random() < share
+        self._in_burst = rng.random() < share
 
     def missing(self) -> bool:
         """Whether it is missing in the next frame."""
-        chance = self._rng.random()
-        self._within = chance >= self._end if self._within else chance < self._begin
-        return self._within or self._rng.random() < self._alone
+        draw = self._rng.random()
+        self._in_burst = (
+            draw >= self._end_probability if self._in_burst else draw < self._begin_probability
+        )
+        return self._in_burst or self._rng.random() < self._single_probability
 
 
 @dataclass(slots=True)
@@ -138,14 +140,14 @@ class SimulatedSegmenter:
     Attributes:
         mission: The mission.
         noise: The errors.
-        who: Region id -> names of the true objects that it shows, filled during reporting.
+        true_names: Region id -> names of the true objects that it shows, filled during reporting.
     """
 
     mission: Mission
     noise: PerceptNoise = field(default_factory=PerceptNoise)
-    who: dict[int, tuple[str, ...]] = field(default_factory=dict, init=False)
+    true_names: dict[int, tuple[str, ...]] = field(default_factory=dict, init=False)
     contract: Contract = field(default=Contract("truth", gives=("region", "health")), init=False)
-    _seen: dict[str, _ObjectNoise] = field(default_factory=dict, init=False)
+    _noise_states: dict[str, _ObjectNoise] = field(default_factory=dict, init=False)
     _coupled: tuple[tuple[float, frozenset[str]], ...] = field(default=(), init=False)
 
     def __post_init__(self) -> None:
@@ -158,7 +160,7 @@ class SimulatedSegmenter:
             contour = ContourNoise(
                 n.contour_px, n.contour_length_px, n.contour_tau_s, self.mission.size, rng
             )
-            self._seen[name] = _ObjectNoise(contour, Dropouts(n, dt, rng), rng)
+            self._noise_states[name] = _ObjectNoise(contour, Dropouts(n, dt, rng), rng)
         self._coupled = tuple(
             (e["frame"] / self.mission.fps, frozenset(e["objects"]))
             for e in self.mission.truth["events"]
@@ -171,18 +173,18 @@ class SimulatedSegmenter:
         """Report one frame; see `Behaviour`."""
         yield Percept("health", Health(HealthStatus.OK), frame.time, "truth")
         for names, mask in self._groups(frame).items():
-            kept = self._seen[names[0]]
-            if int(np.count_nonzero(mask)) < self.noise.least_px or kept.gaps.missing():
+            state = self._noise_states[names[0]]
+            if int(np.count_nonzero(mask)) < self.noise.min_visible_px or state.gaps.missing():
                 continue
             true = self.mission.masks[frame.index][names[0]].velocity
             # Motion is measured between frames: it is unknown for regions missing in the last ones.
-            known = true if frame.time - kept.last < 0.1 else None
-            velocity, sigma = kept.velocity(known, self.noise, 1.0 / self.mission.fps)
+            known = true if frame.time - state.last < 0.1 else None
+            velocity, sigma = state.velocity(known, self.noise, 1.0 / self.mission.fps)
             number = self._number(names, frame.time)
             region = replace(
                 region_of(mask, number, velocity), velocity_sigma=sigma, confidence=CONFIDENCE
             )
-            self.who[region.id] = names
+            self.true_names[region.id] = names
             yield Percept("region", region, frame.time, "truth", region.confidence)
 
     def _groups(self, frame: Frame) -> dict[tuple[str, ...], NDArray[np.bool_]]:
@@ -192,13 +194,15 @@ class SimulatedSegmenter:
         owner = np.full((height, width), -1, np.int8)
         names = list(self.mission.masks[frame.index])
         for k, name in enumerate(names):
-            mask, kept = self.mission.masks[frame.index][name], self._seen[name]
+            mask, state = self.mission.masks[frame.index][name], self._noise_states[name]
             (x, y), shape = mask.at, mask.inside.shape
-            depth = shaken(mask, kept.contour.at(frame.time, mask.at, (shape[0], shape[1])))
+            depth = displaced_distance(
+                mask, state.contour.at(frame.time, mask.at, (shape[0], shape[1]))
+            )
             part = (slice(y, y + shape[0]), slice(x, x + shape[1]))
-            mine = depth > deepest[part]
-            deepest[part][mine] = depth[mine]
-            owner[part][mine] = k
+            closer = depth > deepest[part]
+            deepest[part][closer] = depth[closer]
+            owner[part][closer] = k
         return {
             group: np.isin(owner, [names.index(n) for n in group])
             for group in self._grouped(names, frame.time)
@@ -211,11 +215,11 @@ class SimulatedSegmenter:
 
     def _number(self, names: tuple[str, ...], time: float) -> int:
         """The id that a tracker would give."""
-        kept = max((self._seen[n] for n in names), key=lambda s: (s.last, s.number))
-        fresh = not kept.number or time - kept.last > self.noise.fresh_id_s
-        number = max(s.number for s in self._seen.values()) + 1 if fresh else kept.number
+        state = max((self._noise_states[n] for n in names), key=lambda s: (s.last, s.number))
+        fresh = not state.number or time - state.last > self.noise.fresh_id_s
+        number = max(s.number for s in self._noise_states.values()) + 1 if fresh else state.number
         for name in names:
-            self._seen[name].number, self._seen[name].last = number, time
+            self._noise_states[name].number, self._noise_states[name].last = number, time
         return number
 
 
@@ -224,15 +228,15 @@ class SimulatedRecogniser:
     """A behaviour that says of each region what it looks like, and how far it is.
 
     Attributes:
-        seeing: What reports the regions.
+        segmenter: What reports the regions.
     """
 
-    seeing: SimulatedSegmenter
+    segmenter: SimulatedSegmenter
     contract: Contract = field(init=False)
     _sources: dict[str, HypothesisSource] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
-        noise, mission = self.seeing.noise, self.seeing.mission
+        noise, mission = self.segmenter.noise, self.segmenter.mission
         self.contract = Contract(
             "truth_names", ("hypothesis", "depth"), ("region",), noise.names_every_s
         )
@@ -248,16 +252,16 @@ class SimulatedRecogniser:
     ) -> Iterable[Percept]:
         """Report one frame; see `Behaviour`."""
         for region in observation.of("region"):
-            for value in self._said(region, frame.index):
+            for value in self._reports(region, frame.index):
                 kind = "hypothesis" if isinstance(value, Hypothesis) else "depth"
                 yield Percept(kind, value, frame.time, "truth_names")
 
-    def _said(self, region: Region, index: int) -> Iterator[Hypothesis | Depth]:
-        masks = self.seeing.mission.masks[index]
-        names = self.seeing.who[region.id]
+    def _reports(self, region: Region, index: int) -> Iterator[Hypothesis | Depth]:
+        masks = self.segmenter.mission.masks[index]
+        names = self.segmenter.true_names[region.id]
         # What two bodies look like together is taken for the larger one, or for anything else.
         name = max(names, key=lambda n: masks[n].visible_px if n in masks else 0)
-        yield from self._sources[name].says(region, index, alone=len(names) == 1)
+        yield from self._sources[name].report(region, index, alone=len(names) == 1)
 
 
 def behaviours_of(
@@ -268,8 +272,8 @@ def behaviours_of(
     Returns:
         The behaviours for an agent; and region id -> names of true objects, filled as it runs.
     """
-    seeing = SimulatedSegmenter(mission, noise)
-    return [seeing, SimulatedRecogniser(seeing)], seeing.who
+    segmenter = SimulatedSegmenter(mission, noise)
+    return [segmenter, SimulatedRecogniser(segmenter)], segmenter.true_names
 
 
 def frames_of(mission: Mission, *, every: int = 1) -> Iterator[Frame]:
@@ -284,8 +288,8 @@ def observations_of(
     mission: Mission, noise: PerceptNoise, *, every: int = 1
 ) -> Iterator[tuple[Observation, dict[int, tuple[str, ...]]]]:
     """Simulated observations, each with the truth: region id -> names of true objects."""
-    behaviours, who = behaviours_of(mission, noise)
+    behaviours, true_names = behaviours_of(mission, noise)
     slots = ordered_slots(behaviours)
     for frame in frames_of(mission, every=every):
-        seen = perceive(slots, frame, ())
-        yield seen, {r.id: who[r.id] for r in seen.of("region")}
+        observation = perceive(slots, frame, ())
+        yield observation, {r.id: true_names[r.id] for r in observation.of("region")}

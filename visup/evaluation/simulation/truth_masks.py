@@ -57,7 +57,7 @@ class Mission:
 
     Attributes:
         name: Name of its folder.
-        told: `mission.json`: the input of the supervisor.
+        description: `mission.json`: the input of the supervisor.
         truth: `truth.json`: the ground truth.
         masks: Masks by frame and object.
     """
@@ -97,11 +97,11 @@ def load_mission(folder: Path, *, every: int = 1) -> Mission:
     )
     lag = max(1, round(LAG_S * float(truth["fps"]) / every)) * every
     width, height = truth["size"]
-    moving = tuple(
-        moved_since(masks[max(0, k - lag)], here, lag / float(truth["fps"]), (width, height))
-        for k, here in enumerate(masks)
+    with_velocity = tuple(
+        moved_since(masks[max(0, k - lag)], current, lag / float(truth["fps"]), (width, height))
+        for k, current in enumerate(masks)
     )
-    return Mission(folder.name, read_json(folder / "mission.json"), truth, moving)
+    return Mission(folder.name, read_json(folder / "mission.json"), truth, with_velocity)
 
 
 def moved_since(
@@ -122,13 +122,13 @@ def moved_since(
         The present masks. Objects not visible before have no velocity; edges of occlusion by another object
         are ignored.
     """
-    old = {name: _region(mask, size) for name, mask in before.items()}
+    earlier = {name: _region(mask, size) for name, mask in before.items()}
     moved = {}
     for name, mask in now.items():
         velocity = None
-        if name in old:
-            others = [r for n, r in old.items() if n != name]
-            velocity = _velocity(old[name], others, _region(mask, size), dt, size)
+        if name in earlier:
+            others = [r for n, r in earlier.items() if n != name]
+            velocity = _velocity(earlier[name], others, _region(mask, size), dt, size)
         moved[name] = replace(mask, velocity=velocity)
     return moved
 
@@ -141,12 +141,14 @@ def _region(mask: TrueMask, size: tuple[int, int]) -> Region:
 def _velocity(
     old: Region, others: Sequence[Region], new: Region, dt: float, size: tuple[int, int]
 ) -> tuple[float, float] | None:
-    kept = outline_template(old, others, size)
-    if kept is None:
+    template = outline_template(old, others, size)
+    if template is None:
         return None
     target = TargetOutline.of(prepared_outline(new).points)
-    laid = register_outline(kept, target, _displacements(old, new))
-    return None if laid is None else (laid.shift[0] / dt, laid.shift[1] / dt)
+    registration = register_outline(template, target, _displacements(old, new))
+    return (
+        None if registration is None else (registration.shift[0] / dt, registration.shift[1] / dt)
+    )
 
 
 def _displacements(old: Region, new: Region) -> Iterator[tuple[float, float]]:
@@ -162,11 +164,11 @@ def _displacements(old: Region, new: Region) -> Iterator[tuple[float, float]]:
 
 
 def _masks(path: Path, labels: Mapping[str, int]) -> dict[str, TrueMask]:
-    picture = cv2.imread(opencv_name(path), cv2.IMREAD_GRAYSCALE)
-    if picture is None:
+    label_image = cv2.imread(opencv_name(path), cv2.IMREAD_GRAYSCALE)
+    if label_image is None:
         raise SettingsError("a mask is missing or cannot be read", where=str(path))
-    found = {name: true_mask(np.asarray(picture == label)) for name, label in labels.items()}
-    return {name: mask for name, mask in found.items() if mask is not None}
+    masks = {name: true_mask(np.asarray(label_image == label)) for name, label in labels.items()}
+    return {name: mask for name, mask in masks.items() if mask is not None}
 
 
 def true_mask(mask: NDArray[np.bool_]) -> TrueMask | None:
@@ -209,10 +211,10 @@ class ContourNoise:
     ) -> None:
         self._sigma, self._cell, self._tau, self._rng = sigma, length / 2, tau_s, rng
         self._shape = (int(size[1] / self._cell) + 5, int(size[0] / self._cell) + 5)
-        self._lasting = self._fresh()
+        self._persistent = self._white_noise()
         self._time: float | None = None
 
-    def _fresh(self) -> NDArray[np.float32]:
+    def _white_noise(self) -> NDArray[np.float32]:
         """White noise smoothed over neighbouring cells, with unit variance."""
         white = self._rng.standard_normal(self._shape, dtype=np.float32)
         smooth = cv2.GaussianBlur(white, (0, 0), 1.0, borderType=cv2.BORDER_REFLECT_101)
@@ -231,15 +233,15 @@ class ContourNoise:
         """
         if self._time is not None:
             keep = np.float32(np.exp(-(time - self._time) / self._tau))
-            self._lasting = keep * self._lasting + np.sqrt(1 - keep**2) * self._fresh()
+            self._persistent = keep * self._persistent + np.sqrt(1 - keep**2) * self._white_noise()
         self._time = time
-        field = np.sqrt(np.float32(0.5)) * (self._lasting + self._fresh())
+        field = np.sqrt(np.float32(0.5)) * (self._persistent + self._white_noise())
         # Interpolates between the cells.
-        grow = np.array([[1, 0, corner[0]], [0, 1, corner[1]]], dtype=np.float32) / self._cell
-        grow[:, 2] += 1.0
+        scaling = np.array([[1, 0, corner[0]], [0, 1, corner[1]]], dtype=np.float32) / self._cell
+        scaling[:, 2] += 1.0
         part = cv2.warpAffine(
             field,
-            grow,
+            scaling,
             (shape[1], shape[0]),
             flags=cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP,
             borderMode=cv2.BORDER_REPLICATE,
@@ -247,6 +249,6 @@ class ContourNoise:
         return np.asarray(self._sigma * part)
 
 
-def shaken(mask: TrueMask, shift: NDArray[Any]) -> NDArray[Any]:
+def displaced_distance(mask: TrueMask, shift: NDArray[Any]) -> NDArray[Any]:
     """Signed distance of each pixel of the crop to the displaced outline, pixels; positive inside."""
     return np.asarray(mask.inside * np.float32(_STEP) + shift)

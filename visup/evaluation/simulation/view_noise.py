@@ -67,7 +67,7 @@ class NoisyViews:
         self.name, self.noise, self.rng, self.others = name, noise, rng, others
         self._count = len(directions)
         self._upright = orientations(np.concatenate([directions, -directions]), 0.0)
-        self._mistake: Hypothesis | None = None
+        self._persistent_error: Hypothesis | None = None
 
     def __call__(self, orientation: Floats, region_id: int) -> tuple[Hypothesis, ...]:
         """Hypotheses of one look, best first.
@@ -82,39 +82,51 @@ class NoisyViews:
         swing, _ = swing_and_roll(self._upright, orientation)
         fall = noise.fall * (np.degrees(swing) / 20.0) ** 2
         similarity = noise.similarity - fall + noise.similarity_sigma * rng.normal(size=len(swing))
-        likeliest = np.argsort(-similarity, kind="stable")[: noise.top]
-        said = [self._seen(int(k), float(similarity[k]), orientation, region_id) for k in likeliest]
+        best = np.argsort(-similarity, kind="stable")[: noise.top]
+        hypotheses = [
+            self._view_hypothesis(int(k), float(similarity[k]), orientation, region_id)
+            for k in best
+        ]
         if rng.random() < noise.twin:
-            said[0] = _twin(said[0])
-        first = self._mistaken(said[0], orientation)
-        return (first, *said) if first is not None else tuple(said)
+            hypotheses[0] = _twin(hypotheses[0])
+        first = self._wrong_hypothesis(hypotheses[0], orientation)
+        return (first, *hypotheses) if first is not None else tuple(hypotheses)
 
-    def _seen(self, view: int, similarity: float, true: Floats, region_id: int) -> Hypothesis:
+    def _view_hypothesis(
+        self, view: int, similarity: float, true: Floats, region_id: int
+    ) -> Hypothesis:
         _, roll = swing_and_roll(self._upright[view], true)
-        turned = float(roll) + np.radians(self.noise.roll_deg) * self.rng.normal()
+        rotation = float(roll) + np.radians(self.noise.roll_deg) * self.rng.normal()
         x, y, z = (-self._upright[view][2]).tolist()
-        known = float(np.clip(similarity, 0.0, 1.0))
+        clipped = float(np.clip(similarity, 0.0, 1.0))
         return Hypothesis(
-            region_id, self.name, view % self._count, known, turned, direction=(x, y, z)
+            region_id, self.name, view % self._count, clipped, rotation, direction=(x, y, z)
         )
 
-    def _mistaken(self, right: Hypothesis, true: Floats) -> Hypothesis | None:
+    def _wrong_hypothesis(self, right: Hypothesis, true: Floats) -> Hypothesis | None:
         """A wrong hypothesis that is more similar than the right one, persistent over runs."""
         noise, rng = self.noise, self.rng
-        going_on = self._mistake is not None and rng.random() < 1.0 - 1.0 / noise.wrong_run
+        persists = self._persistent_error is not None and rng.random() < 1.0 - 1.0 / noise.wrong_run
         # Keeps the share of wrong looks independent of the length of runs.
         begin = noise.wrong / (noise.wrong_run * (1.0 - noise.wrong))
-        if not going_on:
-            self._mistake = None
-        if self._mistake is None and not going_on and rng.random() < min(1.0, begin):
-            self._mistake = self._any(right.region_id)
-        if self._mistake is None:
+        if not persists:
+            self._persistent_error = None
+        if self._persistent_error is None and not persists and rng.random() < min(1.0, begin):
+            self._persistent_error = self._random_hypothesis(right.region_id)
+        if self._persistent_error is None:
             return None
-        shown = min(1.0, right.similarity + 0.05 * rng.random())
-        m = self._mistake
-        return Hypothesis(m.region_id, m.name, m.view, shown, m.rotation, direction=m.direction)
+        similarity = min(1.0, right.similarity + 0.05 * rng.random())
+        wrong = self._persistent_error
+        return Hypothesis(
+            wrong.region_id,
+            wrong.name,
+            wrong.view,
+            similarity,
+            wrong.rotation,
+            direction=wrong.direction,
+        )
 
-    def _any(self, region_id: int) -> Hypothesis:
+    def _random_hypothesis(self, region_id: int) -> Hypothesis:
         rng = self.rng
         view = int(rng.integers(len(self._upright)))
         names = (self.name, *self.others)

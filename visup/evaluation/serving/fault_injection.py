@@ -12,10 +12,10 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-SMALL_DISK = 4e9
+MAX_DISK_BYTES = 4e9
 """Largest disk that may be filled, bytes."""
 
-PIECE = b"\0" * 2**20
+BLOCK = b"\0" * 2**20
 
 
 def pid_of(store: Path, camera: str) -> int:
@@ -33,14 +33,14 @@ class Kill:
 
     Attributes:
         camera: The camera.
-        at: Time of the kill, seconds.
+        time: Time of the kill, seconds.
         restarts: Restarts of the camera before.
         frames: Reported frames when its process had been restarted; None before.
         back_s: Seconds until the next reported frame; None before.
     """
 
     camera: str
-    at: float
+    time: float
     restarts: float
     frames: float | None = None
     back_s: float | None = None
@@ -61,13 +61,13 @@ class Timetable:
         """Do what is due."""
         if not self._due:
             self._due = [now + every for every, _ in self.every]
-        for number, (every, act) in enumerate(self.every):
+        for number, (every, action) in enumerate(self.every):
             if now >= self._due[number]:
                 self._due[number] = now + every
-                act()
+                action()
 
 
-class Killer:
+class ProcessKiller:
     """Kills camera processes at random, and measures the outages.
 
     Args:
@@ -84,7 +84,7 @@ class Killer:
         self._store, self._cameras = store, cameras
         self._rng = random.Random(seed)  # dice, not secrets
 
-    def strike(self, restarts: Mapping[str, float]) -> None:
+    def kill_one(self, restarts: Mapping[str, float]) -> None:
         """Kill one, given the restarts of each."""
         camera = self._rng.choice(self._cameras)
         pid = pid_of(self._store, camera)
@@ -92,19 +92,19 @@ class Killer:
             os.kill(pid, signal.SIGKILL)
             self.kills.append(Kill(camera, time.monotonic(), restarts.get(camera, 0.0)))
 
-    def look(self, restarts: Mapping[str, float], frames: Mapping[str, float]) -> None:
+    def note_recoveries(self, restarts: Mapping[str, float], frames: Mapping[str, float]) -> None:
         """Detect recovered cameras: those with a new frame since the restart."""
         for kill in self.kills:
-            now = frames.get(kill.camera, 0.0)
+            frame_count = frames.get(kill.camera, 0.0)
             if kill.back_s is not None or restarts.get(kill.camera, 0.0) <= kill.restarts:
                 continue
             if kill.frames is None:
-                kill.frames = now
-            elif now > kill.frames:
-                kill.back_s = time.monotonic() - kill.at
+                kill.frames = frame_count
+            elif frame_count > kill.frames:
+                kill.back_s = time.monotonic() - kill.time
 
 
-class Balloon:
+class DiskFiller:
     """Fills a small disk temporarily.
 
     Args:
@@ -121,13 +121,13 @@ class Balloon:
     @property
     def possible(self) -> bool:
         """Whether the disk is small enough to be filled."""
-        return shutil.disk_usage(self._file.parent).total <= SMALL_DISK
+        return shutil.disk_usage(self._file.parent).total <= MAX_DISK_BYTES
 
     def fill(self) -> None:
         """Fill the disk."""
         self.filled += 1
         with suppress(OSError), self._file.open("wb", buffering=0) as file:
-            while file.write(PIECE):
+            while file.write(BLOCK):
                 pass
 
     def empty(self) -> None:

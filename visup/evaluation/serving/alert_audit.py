@@ -19,17 +19,17 @@ from visup.agent.storage.journal_reader import JOURNAL, Recording
 from visup.runs.evidence.keeper import EVIDENCE
 from visup.sinks.delivery_log import DELIVERY
 
-MOST_SHOWN = 50
+MAX_EXAMPLES = 50
 
 Opening = tuple[int, float]
 """Number of the alert, and time of opening, seconds."""
 
-Told = tuple[int, float, str]
+StateChange = tuple[int, float, str]
 """The same with 'opened' or 'closed'."""
 
 
 @dataclass(frozen=True, slots=True)
-class Account:
+class AlertAudit:
     """The account of the alerts of one camera.
 
     Attributes:
@@ -51,7 +51,7 @@ class Account:
     wrong: tuple[str, ...] = ()
 
 
-class Ledger:
+class AlertAuditor:
     """The alerts read from the journals of a camera so far.
 
     Args:
@@ -60,11 +60,11 @@ class Ledger:
 
     def __init__(self, camera: Path) -> None:
         self._camera = camera
-        self._recorded: set[Told] = set()
+        self._recorded: set[StateChange] = set()
         self._with_evidence: set[Opening] = set()
-        self._seen: dict[Path, float] = {}
+        self._modified_at: dict[Path, float] = {}
 
-    def look(self) -> None:
+    def read_store(self) -> None:
         """Read the present content of the store."""
         for journal in sorted(self._camera.glob(f"*/{JOURNAL}")):
             with suppress(OSError, VisupError):  # just being deleted or begun
@@ -73,51 +73,55 @@ class Ledger:
         for note in self._camera.glob(f"*/{EVIDENCE}/alert-*.json"):
             with suppress(OSError, ValueError, KeyError):
                 if self._is_new(note):
-                    told = json.loads(note.read_text())
-                    self._with_evidence.add(_opening(told))
+                    document = json.loads(note.read_text())
+                    self._with_evidence.add(_opening(document))
 
-    def account(self, taken: Iterable[Mapping[str, Any]]) -> Account:
+    def audit(self, received: Iterable[Mapping[str, Any]]) -> AlertAudit:
         """The account of the alerts of the camera.
 
         Args:
-            taken: Records received by a sink, of any camera.
+            received: Records received by a sink, of any camera.
         """
         own = [
-            r for r in taken if r.get("record") == "alert" and r.get("camera") == self._camera.name
+            record
+            for record in received
+            if record.get("record") == "alert" and record.get("camera") == self._camera.name
         ]
-        counts = Counter((*_opening(r), str(r["state"])) for r in own)
-        deliveries = Counter(str(r[DELIVERY]) for r in own if DELIVERY in r)
-        opened = {told[:2] for told in self._recorded}
-        wrong = {
+        counts = Counter((*_opening(record), str(record["state"])) for record in own)
+        deliveries = Counter(str(record[DELIVERY]) for record in own if DELIVERY in record)
+        opened = {change[:2] for change in self._recorded}
+        discrepancies = {
             "lost": self._recorded - set(counts),
-            "twice": {told for told, n in counts.items() if n > 1},
+            "twice": {change for change, n in counts.items() if n > 1},
             "unrecorded": set(counts) - self._recorded,
         }
-        return Account(
+        return AlertAudit(
             alerts=len(opened),
-            lost=len(wrong["lost"]),
+            lost=len(discrepancies["lost"]),
             twice=sum(n - 1 for n in counts.values()),
             resent=sum(n - 1 for n in deliveries.values()),
-            unrecorded=len(wrong["unrecorded"]),
+            unrecorded=len(discrepancies["unrecorded"]),
             without_evidence=len(opened - self._with_evidence),
-            wrong=tuple(f"{how}: {told}" for how, each in wrong.items() for told in sorted(each))[
-                :MOST_SHOWN
-            ],
+            wrong=tuple(
+                f"{how}: {change}"
+                for how, changes in discrepancies.items()
+                for change in sorted(changes)
+            )[:MAX_EXAMPLES],
         )
 
     def _is_new(self, path: Path, *others: str) -> bool:
         """Whether a file was written to since it was last read."""
-        when = max(p.stat().st_mtime for p in (path, *map(Path, others)) if p.exists())
-        before = self._seen.get(path)
-        self._seen[path] = when
-        return when != before
+        modified_at = max(p.stat().st_mtime for p in (path, *map(Path, others)) if p.exists())
+        before = self._modified_at.get(path)
+        self._modified_at[path] = modified_at
+        return modified_at != before
 
 
 def _opening(record: Mapping[str, Any]) -> Opening:
     return int(record["id"]), round(float(record["opened"]), 3)
 
 
-def _recorded(run: Path) -> Iterator[Told]:
+def _recorded(run: Path) -> Iterator[StateChange]:
     """The openings and closings in a journal; an alert open across two runs is in both."""
     for alert in Recording.open(run).alerts().values():
         yield (*_opening(alert), "opened")
