@@ -11,7 +11,7 @@ from visup.agent.model.errors import SettingsError
 from visup.evaluation.machines.clips import clip_folders, parse_truth, read_brief, read_truth
 from visup.evaluation.machines.runner import clip_settings
 
-SHOWN = {"clip": "one", "frame": 3, "polygon": [[0, 0], [9, 0], [9, 9]]}
+OUTLINE = {"clip": "one", "frame": 3, "polygon": [[0, 0], [9, 0], [9, 9]]}
 TASK = "<lift> ::= coupled(gripper, part)\n"
 
 
@@ -25,36 +25,41 @@ def clip(tmp_path: Path) -> Path:
     return folder
 
 
-def write(folder: Path, **told: Any) -> None:
-    (folder / "brief.json").write_text(json.dumps({"task": "own.task", **told}), encoding="utf-8")
+def write_brief(folder: Path, **fields: Any) -> None:
+    (folder / "brief.json").write_text(json.dumps({"task": "own.task", **fields}), encoding="utf-8")
 
 
-def test_what_is_outlined_in_the_clip_itself_takes_the_place_of_what_is_taught_elsewhere(
+def test_outlines_in_the_clip_itself_replace_those_in_other_clips(
     clip: Path,
 ) -> None:
-    elsewhere = {**SHOWN, "frame": 8}
-    write(clip, teach={"part": elsewhere, "gripper": elsewhere}, teach_own={"part": SHOWN})
+    elsewhere = {**OUTLINE, "frame": 8}
+    write_brief(clip, teach={"part": elsewhere, "gripper": elsewhere}, teach_own={"part": OUTLINE})
     assert {s.name: s.frame for s in read_brief(clip).actors} == {"part": 3, "gripper": 8}
 
 
-def test_things_that_are_no_actors_are_taught_too_but_bound_to_nothing(clip: Path) -> None:
-    write(clip, teach={"part": SHOWN, "gripper": SHOWN, "lamp": SHOWN}, teach_extra={"hand": SHOWN})
+def test_objects_that_are_no_actors_are_taught_but_not_bound(clip: Path) -> None:
+    write_brief(
+        clip,
+        teach={"part": OUTLINE, "gripper": OUTLINE, "lamp": OUTLINE},
+        teach_extra={"hand": OUTLINE},
+    )
     brief = read_brief(clip)
     assert [o.name for o in brief.others] == ["hand"]
     assert clip_settings(brief).actors == {"part": ("part",), "gripper": ("gripper",)}
 
 
 def test_a_brief_without_a_task_is_refused(clip: Path) -> None:
-    (clip / "brief.json").write_text(json.dumps({"teach": {"part": SHOWN}}), encoding="utf-8")
+    (clip / "brief.json").write_text(json.dumps({"teach": {"part": OUTLINE}}), encoding="utf-8")
     with pytest.raises(SettingsError, match='names no "task"'):
         read_brief(clip)
 
 
 @pytest.mark.parametrize(
-    "told", [{}, {"teach": {"part": {"frame": 0}}}, {"teach": {"part": {**SHOWN, "frame": "x"}}}]
+    "fields",
+    [{}, {"teach": {"part": {"frame": 0}}}, {"teach": {"part": {**OUTLINE, "frame": "x"}}}],
 )
-def test_a_brief_that_is_not_as_it_should_be_is_refused(clip: Path, told: dict[str, Any]) -> None:
-    write(clip, **told)
+def test_a_malformed_brief_is_refused(clip: Path, fields: dict[str, Any]) -> None:
+    write_brief(clip, **fields)
     with pytest.raises(SettingsError):
         read_brief(clip)
 
@@ -64,7 +69,7 @@ def test_a_folder_without_briefs_is_refused(tmp_path: Path) -> None:
         clip_folders(tmp_path)
 
 
-def test_boxes_that_are_null_or_absent_are_not_scored() -> None:
+def test_missing_boxes_are_not_scored() -> None:
     truth = parse_truth({"boxes": [{"frame": 2, "part": None, "tray": [1, 2, 3, 4]}]})
     assert truth.boxes[0].boxes == {"tray": (1, 2, 3, 4)}
 

@@ -20,17 +20,17 @@ def arm_mask(_: int) -> NDArray[np.uint8]:
     return mask
 
 
-def motions(places: list[tuple[float, float]], arm: bool) -> list[CameraMotion]:
+def motions(positions: list[tuple[float, float]], arm: bool) -> list[CameraMotion]:
     mask = arm_mask if arm else lambda _: np.zeros((HEIGHT, WIDTH), np.uint8)
-    camera, told = SceneCamera(mask), []
-    for number, place in enumerate(places):
-        image = picture(place, ARM_BOTTOM if arm else 0, number)
+    camera, reported = SceneCamera(mask), []
+    for number, position in enumerate(positions):
+        image = picture(position, ARM_BOTTOM if arm else 0, number)
         if arm:  # it moves by itself, within its mask
             image[:ARM_BOTTOM, 60:180] = np.roll(ARM, 3 * number, 0)[:ARM_BOTTOM, 60:180, None]
         frame = Frame(number, number / FPS, image)
-        seen = Observation(number, frame.time, frame.size)
-        told += [p.value for p in camera.perceive(frame, seen, ())]
-    return told
+        observation = Observation(number, frame.time, frame.size)
+        reported += [p.value for p in camera.perceive(frame, observation, ())]
+    return reported
 
 
 steps = st.lists(st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0)), min_size=2, max_size=5)
@@ -41,12 +41,12 @@ steps = st.lists(st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0)), min_size
 def test_the_scene_moves_with_the_camera_whatever_an_object_does(
     moves: list[tuple[float, float]], arm: bool
 ) -> None:
-    places = [tuple(p) for p in np.vstack([(0.0, 0.0), np.cumsum(moves, axis=0)]).tolist()]
-    told = motions(places, arm)
+    positions = [tuple(p) for p in np.vstack([(0.0, 0.0), np.cumsum(moves, axis=0)]).tolist()]
+    reported = motions(positions, arm)
     # What rests moves in the picture against the camera.
-    way = np.sum([m.displacement((30.0, 160.0)) for m in told], axis=0)
-    assert np.hypot(*(way + np.array(places[-1]))) < 0.5 + 0.1 * len(moves)
+    displacement = np.sum([m.displacement((30.0, 160.0)) for m in reported], axis=0)
+    assert np.hypot(*(displacement + np.array(positions[-1]))) < 0.5 + 0.1 * len(moves)
 
 
-def test_a_camera_at_rest_is_told_to_rest() -> None:
+def test_a_camera_at_rest_is_reported_as_at_rest() -> None:
     assert all(np.array_equal(m.motion, np.eye(2, 3)) for m in motions([(0.0, 0.0)] * 4, True))

@@ -78,7 +78,7 @@ def test_beyond_the_tolerance_no_stage_counts(by: float) -> None:
     assert machine_scores(shifted(PERFECT, by), TRUTH)["stage_f1"] == 0.0
 
 
-def test_a_report_that_comes_late_is_wrong_though_it_states_the_right_beginning() -> None:
+def test_a_late_report_is_wrong_even_if_it_states_the_true_beginning() -> None:
     late = tuple(replace(s, time=s.time + 2.0, began=s.time) for s in PERFECT.stages)
     scores = machine_scores(replace(PERFECT, stages=late), TRUTH)
     assert (scores["stage_f1"], scores["stage_dated_f1"]) == (0.0, 1.0)
@@ -91,42 +91,44 @@ def test_beyond_a_second_no_interval_counts(by: float) -> None:
     assert scores["contact_f1"] == scores["move_f1"] == 0.0
 
 
-def test_an_empty_report_finds_nothing_and_has_nothing_wrong() -> None:
+def test_an_empty_report_has_no_recall_but_full_precision() -> None:
     scores = machine_scores(MachineReport("unknown", boxes={0: {}, 30: {}}, seconds=10.0), TRUTH)
     assert [scores[k] for k in F1S] == [0.0] * 4
     assert scores["stage_precision"] == 1.0
 
 
 def test_a_wrong_outcome_makes_a_stage_wrong() -> None:
-    told = (*PERFECT.stages[:2], ReportedStage("carry", 5.0, "complete"))
-    assert matched_stages(told, STAGES, 0.7) == (2, 1, 1)
+    reported = (*PERFECT.stages[:2], ReportedStage("carry", 5.0, "complete"))
+    assert matched_stages(reported, STAGES, 0.7) == (2, 1, 1)
 
 
-def test_stages_count_in_their_order_only() -> None:
-    near = [TrueStage("a", 1.0, 1.2, "complete"), TrueStage("b", 1.2, 2.0, "complete")]
-    told = [ReportedStage("b", 1.0, "complete"), ReportedStage("a", 1.3, "complete")]
-    assert matched_stages(told, near, 0.7) == (1, 1, 1)
+def test_stages_in_the_wrong_order_do_not_match() -> None:
+    ground_truth = [TrueStage("a", 1.0, 1.2, "complete"), TrueStage("b", 1.2, 2.0, "complete")]
+    reported = [ReportedStage("b", 1.0, "complete"), ReportedStage("a", 1.3, "complete")]
+    assert matched_stages(reported, ground_truth, 0.7) == (1, 1, 1)
 
 
 def test_each_true_stage_counts_once() -> None:
-    told = [ReportedStage("reach", t, "complete") for t in (0.8, 1.0, 1.2)]
-    assert matched_stages(told, STAGES, 0.7) == (1, 2, 2)
+    reported = [ReportedStage("reach", t, "complete") for t in (0.8, 1.0, 1.2)]
+    assert matched_stages(reported, STAGES, 0.7) == (1, 2, 2)
 
 
 words = st.lists(st.sampled_from("ab"), max_size=6)
 
 
 @given(words, words)
-def test_the_longest_common_row_is_that_of_brute_force(first: list[str], second: list[str]) -> None:
-    def rows(word: list[str]) -> set[str]:
+def test_the_longest_common_subsequence_agrees_with_brute_force(
+    first: list[str], second: list[str]
+) -> None:
+    def subsequences(word: list[str]) -> set[str]:
         every = (combinations(word, n) for n in range(len(word) + 1))
         return {"".join(c) for row in every for c in row}
 
-    most = max(map(len, rows(first) & rows(second)))
-    assert longest_common(first, second, str.__eq__) == most
+    longest = max(map(len, subsequences(first) & subsequences(second)))
+    assert longest_common(first, second, str.__eq__) == longest
 
 
-def test_intervals_of_other_bodies_do_not_count() -> None:
+def test_intervals_of_other_objects_do_not_match() -> None:
     other = [Interval(("gripper", "tray"), 3.0, 7.0)]
     assert matched_intervals(other, TRUTH.contacts or ()) == (0, 1, 1)
 
@@ -143,7 +145,7 @@ def test_the_overlap_of_boxes_is_symmetric_and_one_with_itself(
     assert box_iou(a, a) == pytest.approx(1.0)
 
 
-def test_frames_that_were_not_watched_have_no_say() -> None:
+def test_frames_that_were_not_watched_are_not_scored() -> None:
     scores = machine_scores(replace(PERFECT, boxes={0: {"part": (10, 10, 20, 20)}}), TRUTH)
     assert scores["actors"] == 1.0
     assert scores["actor_counts"] == [1, 1]
@@ -164,24 +166,26 @@ def test_alerts_of_a_stage_that_truly_fails_are_not_false(alert: ReportedAlert, 
     assert false_alerts([alert], TRUTH) == false
 
 
-def test_any_alert_is_false_where_all_goes_well() -> None:
-    well = replace(TRUTH, stages=STAGES[:2])
-    assert false_alerts([ReportedAlert("stage_failing", "carry", 6.0)], well) == 1
+def test_any_alert_is_false_in_a_faultless_run() -> None:
+    faultless = replace(TRUTH, stages=STAGES[:2])
+    assert false_alerts([ReportedAlert("stage_failing", "carry", 6.0)], faultless) == 1
 
 
 def test_all_accepted_verdicts_are_right() -> None:
     truth = replace(TRUTH, accept=frozenset({"failed", "in_progress"}))
-    told = [machine_scores(replace(PERFECT, verdict=v), truth) for v in ("in_progress", "unknown")]
-    assert [s["verdicts_right"] for s in told] == [1, 0]
+    scores = [
+        machine_scores(replace(PERFECT, verdict=v), truth) for v in ("in_progress", "unknown")
+    ]
+    assert [s["verdicts_right"] for s in scores] == [1, 0]
 
 
-def test_the_total_weighs_each_stage_alike() -> None:
+def test_each_stage_has_equal_weight_in_the_total() -> None:
     nothing = machine_scores(MachineReport("unknown", seconds=10.0), TRUTH)
     total = machine_total([machine_scores(PERFECT, TRUTH), nothing])
     assert total["stage_recall"] == 0.5
     assert (total["verdicts_right"], total["verdicts"]) == (1, 2)
 
 
-def test_what_comes_after_the_end_is_not_scored() -> None:
+def test_truth_after_the_watched_part_is_not_scored() -> None:
     short = machine_scores(replace(PERFECT, stages=PERFECT.stages[:1], seconds=2.0), TRUTH)
     assert short["stage_f1"] == 1.0

@@ -46,7 +46,7 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Path:
         video.write(picture)
         cv2.imwrite(str(folder / "masks" / f"{n:05d}.png"), mask)
     video.release()
-    write_story(folder)
+    write_documents(folder)
     return folder
 
 
@@ -55,10 +55,10 @@ def corners(box: tuple[int, int, int, int]) -> list[list[int]]:
     return [[x, y], [x + w - 1, y], [x + w - 1, y + h - 1], [x, y + h - 1]]
 
 
-def write_story(folder: Path) -> None:
+def write_documents(folder: Path) -> None:
     (folder / "meet.task").write_text(TASK, encoding="utf-8")
-    shown = {"ball": corners(ball_box(0)), "post": corners(post_box())}
-    teach = {n: {"clip": "meet", "frame": 0, "polygon": c} for n, c in shown.items()}
+    outlines = {"ball": corners(ball_box(0)), "post": corners(post_box())}
+    teach = {n: {"clip": "meet", "frame": 0, "polygon": c} for n, c in outlines.items()}
     brief = {"name": "meet", "family": "meet", "task": "meet.task", "teach": teach}
     truth = {
         "labels": {"ball": 2, "post": 3},
@@ -72,27 +72,27 @@ def write_story(folder: Path) -> None:
     (folder / "truth.json").write_text(json.dumps(truth), encoding="utf-8")
 
 
-def test_by_its_masks_a_world_is_seen_as_it_is(world: Path) -> None:
+def test_reports_from_masks_agree_with_the_truth(world: Path) -> None:
     total = evaluate_machines(world, eyes=True)["total"]
     assert (total["actors"], total["verdicts_right"]) == (1.0, 1)
 
 
-def test_the_baseline_follows_boxes(world: Path) -> None:
+def test_the_baseline_tracks_boxes(world: Path) -> None:
     boxes = watch_boxes(read_brief(world)).boxes or {}
     assert box_iou(boxes[20]["ball"], ball_box(20)) > 0.5
 
 
-def test_only_the_frames_that_are_asked_for_are_watched(world: Path) -> None:
+def test_only_the_requested_frames_are_watched(world: Path) -> None:
     assert set(watch_by_masks(read_brief(world), 5).boxes or {}) == set(range(5))
 
 
-def test_a_clip_without_masks_cannot_be_seen_by_them(tmp_path: Path) -> None:
+def test_a_clip_without_masks_is_refused_for_ideal_perception(tmp_path: Path) -> None:
     (tmp_path / "brief.json").write_text("{}", encoding="utf-8")
     with pytest.raises(SettingsError, match="masks"):
         evaluate_machines(tmp_path, eyes=True)
 
 
-def test_what_is_shown_once_is_taught_and_watched(world: Path) -> None:
+def test_a_world_is_watched_from_pixels_and_by_the_baseline(world: Path) -> None:
     figures = evaluate_machines(world, limit=4)
     assert set(figures) == {"total", "items", "baseline"}
     assert {"verdicts", "ms", "false_alerts_per_min"} <= set(figures["baseline"])

@@ -39,7 +39,7 @@ UNSAFE = MissionTruth(
 )
 
 times = st.integers(0, 12).map(lambda n: n / 2)
-told_events = st.lists(
+reported_events = st.lists(
     st.builds(ReportedEvent, st.sampled_from(["exit", "entry"]), st.sampled_from([A, B]), times),
     max_size=5,
 )
@@ -49,38 +49,41 @@ true_events = st.lists(
 )
 
 
-def most_matches(told: list[ReportedEvent], true: list[TrueEvent]) -> int:
+def max_matches(reported: list[ReportedEvent], true: list[TrueEvent]) -> int:
     """Brute force: the largest number of events that any pairing makes right."""
-    said = [t for t in told if not (t.kind == "entry" and t.time < 2)]
-    real = [t for t in true if not (t.kind == "entry" and t.time < 2)]
-    if len(said) < len(real):
-        said = [*said, *[ReportedEvent("none", frozenset(), 0.0)] * (len(real) - len(said))]
+    scored_reports = [t for t in reported if not (t.kind == "entry" and t.time < 2)]
+    scored_truth = [t for t in true if not (t.kind == "entry" and t.time < 2)]
+    if len(scored_reports) < len(scored_truth):
+        scored_reports = [
+            *scored_reports,
+            *[ReportedEvent("none", frozenset(), 0.0)] * (len(scored_truth) - len(scored_reports)),
+        ]
     return max(
         sum(
             a.kind == b.kind
             and a.objects == b.objects
             and abs(a.time - b.time) <= EVENT_TOLERANCE_S
-            for a, b in zip(order, real, strict=False)
+            for a, b in zip(order, scored_truth, strict=False)
         )
-        for order in permutations(said, len(real))
+        for order in permutations(scored_reports, len(scored_truth))
     )
 
 
-@given(told_events, true_events)
+@given(reported_events, true_events)
 def test_events_are_matched_once_each_and_nearly_as_well_as_any_pairing(
-    told: list[ReportedEvent], true: list[TrueEvent]
+    reported: list[ReportedEvent], true: list[TrueEvent]
 ) -> None:
-    right, excess, missed = matched_events(told, true)
-    scored = [t for t in told if not (t.kind == "entry" and t.time < 2)]
-    real = [t for t in true if not (t.kind == "entry" and t.time < 2)]
-    assert right + excess == len(scored)
-    assert right + missed == len(real)
-    best = most_matches(told, true)
-    assert best / 2 <= right <= best  # nearest first is at least half of the best pairing
+    matched, excess, missed = matched_events(reported, true)
+    scored = [t for t in reported if not (t.kind == "entry" and t.time < 2)]
+    scored_truth = [t for t in true if not (t.kind == "entry" and t.time < 2)]
+    assert matched + excess == len(scored)
+    assert matched + missed == len(scored_truth)
+    best = max_matches(reported, true)
+    assert best / 2 <= matched <= best  # nearest first is at least half of the best pairing
 
 
 @given(true_events)
-def test_telling_the_truth_scores_one(true: list[TrueEvent]) -> None:
+def test_reporting_the_truth_scores_one(true: list[TrueEvent]) -> None:
     counts = matched_events([ReportedEvent(e.kind, e.objects, e.time) for e in true], true)
     assert counts[1:] == (0, 0)
     assert precision_recall_f1(*counts) == (1.0, 1.0, 1.0)
@@ -110,23 +113,25 @@ def test_a_wrong_object_is_both_excess_and_missed() -> None:
         (UNSAFE, 7.0, ("approach", "unsafe")),
     ],
 )
-def test_what_is_true_when(
+def test_the_true_outcome_at_a_time(
     truths: MissionTruth, time: float, expected: tuple[str, str] | None
 ) -> None:
     assert true_outcome(truths, time) == expected
 
 
 def samples(truths: MissionTruth, shift: float = 0.0) -> list[StageSample]:
-    out = []
+    stage_samples = []
     for i in range(0, 800):
         t = i / 25
-        said = true_outcome(truths, t - shift)
-        out.append(StageSample(t, *(said or (None, None))))
-    return out
+        outcome = true_outcome(truths, t - shift)
+        stage_samples.append(StageSample(t, *(outcome or (None, None))))
+    return stage_samples
 
 
 @pytest.mark.parametrize("truths", [FAILS, UNSAFE])
-def test_truth_told_within_a_second_is_perfect_and_later_it_is_not(truths: MissionTruth) -> None:
+def test_stages_reported_within_a_second_are_correct_and_later_ones_are_not(
+    truths: MissionTruth,
+) -> None:
     assert stage_share(samples(truths), truths) == 1.0
     assert stage_share(samples(truths, 0.9), truths) == 1.0
     late = stage_share(samples(truths, 3.0), truths)
@@ -134,7 +139,7 @@ def test_truth_told_within_a_second_is_perfect_and_later_it_is_not(truths: Missi
     assert 0.5 < late < 1.0
 
 
-def test_silence_scores_nothing_and_nothing_to_score_is_none() -> None:
+def test_no_reports_score_zero_and_nothing_to_score_gives_none() -> None:
     silent = [StageSample(i / 25, None, None) for i in range(800)]
     assert stage_share(silent, FAILS) == 0.0
     assert stage_share(silent, MissionTruth((), (), (), "interrupted")) is None
@@ -147,7 +152,7 @@ def test_latency_of_failing() -> None:
 
 
 @pytest.mark.parametrize(
-    ("told", "expected"),
+    ("reported", "expected"),
     [
         ([], (0, 0)),
         (
@@ -169,12 +174,14 @@ def test_latency_of_failing() -> None:
         ),
     ],
 )
-def test_alerts(told: list[ReportedEvent], expected: tuple[int, int]) -> None:
-    assert scored_alerts(told, UNSAFE.alerts) == expected
+def test_expected_alerts_are_found_and_others_are_false(
+    reported: list[ReportedEvent], expected: tuple[int, int]
+) -> None:
+    assert scored_alerts(reported, UNSAFE.alerts) == expected
 
 
-def test_truth_is_read_as_it_stands_in_the_file() -> None:
-    read = parse_truth(
+def test_truth_is_parsed_from_its_file() -> None:
+    parsed = parse_truth(
         {
             "events": [{"kind": "coupled", "objects": ["a", "b"], "frame": 50}],
             "stages": [{"stage": "s", "from_s": 1, "to_s": 2, "outcome": "complete"}],
@@ -184,6 +191,6 @@ def test_truth_is_read_as_it_stands_in_the_file() -> None:
         },
         fps=25,
     )
-    assert read.events == (TrueEvent("coupled", A | B, 2.0),)
-    assert read.alerts == (TrueAlert("x", 3.0),)
-    assert read.names == {"a": "mesh_a"}
+    assert parsed.events == (TrueEvent("coupled", A | B, 2.0),)
+    assert parsed.alerts == (TrueAlert("x", 3.0),)
+    assert parsed.names == {"a": "mesh_a"}

@@ -42,10 +42,10 @@ NO_NOISE = BoxSettings(
 
 
 def watched(frames: Floats, fps: float = 25.0, s: BoxSettings | None = None) -> Boxes:
-    kept = Boxes()
+    beliefs = Boxes()
     for k, boxes in enumerate(frames):
-        kept = watch_boxes(kept, tuple(range(len(boxes))), boxes, k / fps, s)
-    return kept
+        beliefs = watch_boxes(beliefs, tuple(range(len(boxes))), boxes, k / fps, s)
+    return beliefs
 
 
 def test_rcc8_agrees_with_its_definition() -> None:
@@ -99,7 +99,7 @@ def test_rcc8_does_not_depend_on_place_and_scale_and_has_converses(
 
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 10**6))
-def test_time_that_runs_backwards_turns_every_movement_round(seed: int) -> None:
+def test_reversed_time_reverses_every_velocity(seed: int) -> None:
     frames = moving_boxes(3, 60, seed, noise=0.0)
     there, back = watched(frames), watched(frames[::-1])
     assert np.allclose(there.velocity, -back.velocity)
@@ -133,14 +133,14 @@ def test_relations_do_not_depend_on_place_and_come_as_converses(seed: int, shift
         assert one is None or other is None or one == other[::-1]
 
 
-def test_without_noise_it_is_what_plain_numpy_says() -> None:
+def test_without_noise_relations_agree_with_plain_numpy() -> None:
     frames = np.round(moving_boxes(12, 60, 3, noise=0.0))
     frames[30:] = frames[30]  # The last frames stand still, so that nothing is pending.
-    kept = watched(frames, s=NO_NOISE)
+    beliefs = watched(frames, s=NO_NOISE)
     code, _, distance, _ = plain_relations(frames[-1], frames[-1], 1.0)
     i, j = np.triu_indices(12, 1)
-    assert (kept.rcc8 == code[i, j]).all()
-    assert np.allclose(np.maximum(kept.gap, 0.0), distance[i, j])
+    assert (beliefs.rcc8 == code[i, j]).all()
+    assert np.allclose(np.maximum(beliefs.gap, 0.0), distance[i, j])
 
 
 @pytest.mark.parametrize("scene", SCENES)
@@ -148,23 +148,23 @@ def test_boxes_at_rest_change_no_relation(scene: str) -> None:
     assert changes(*SCENES[scene], minutes=0.7, seed=5) == 0
 
 
-def test_drift_is_seen_within_two_seconds() -> None:
+def test_drift_is_detected_within_two_seconds() -> None:
     assert drift_seen(seed=3, trials=6) < 2.0
 
 
-def test_a_box_out_of_sight_is_unknown_and_another_comes_as_unknown() -> None:
+def test_relations_of_hidden_and_of_new_boxes_are_unknown() -> None:
     frames = moving_boxes(3, 60, 2)
-    kept = watched(frames)
-    gone = frames[-1].copy()
-    gone[1] = np.nan
-    after = watch_boxes(kept, (0, 1, 2), gone, 60 / 25)
+    before = watched(frames)
+    hidden = frames[-1].copy()
+    hidden[1] = np.nan
+    after = watch_boxes(before, (0, 1, 2), hidden, 60 / 25)
     assert after.rcc8_of(0, 1) is None
     assert after.qtc_of(1, 2) is None
-    assert after.rcc8_of(0, 2) == kept.rcc8_of(0, 2)
-    other = watch_boxes(kept, (0, 2, 7), frames[-1], 60 / 25)
-    assert other.direction_of(0, 2) == kept.direction_of(0, 2)
+    assert after.rcc8_of(0, 2) == before.rcc8_of(0, 2)
+    other = watch_boxes(before, (0, 2, 7), frames[-1], 60 / 25)
+    assert other.direction_of(0, 2) == before.direction_of(0, 2)
     assert other.direction_of(0, 7) is None
-    assert other.qtc_of(0, 2) == kept.qtc_of(0, 2)
+    assert other.qtc_of(0, 2) == before.qtc_of(0, 2)
 
 
 @pytest.mark.parametrize("turn", range(8))
@@ -178,7 +178,7 @@ def test_directions_are_cones_about_their_axes(turn: int) -> None:
     assert DIRECTION_NAMES[6] == "north_of"
 
 
-def test_directions_are_kept_a_little_beyond_their_cone() -> None:
+def test_directions_have_hysteresis_at_the_edge_of_their_cone() -> None:
     edge = np.pi / 8
     for beyond, kept in ((0.04, 0), (0.12, 1)):
         x, y = 100 * np.cos(edge + beyond), 100 * np.sin(edge + beyond)
@@ -212,7 +212,7 @@ def test_gaps_are_the_distances_of_boxes_and_the_depth_of_their_overlap() -> Non
         assert box_gaps(np.array([A, other], float))[0] == pytest.approx(gap)
 
 
-def test_states_are_rows_of_codes_that_the_calculi_have() -> None:
+def test_states_are_codes_of_their_calculus() -> None:
     state = watched(moving_boxes(8, 80, 4)).hysteresis.state
     assert set(np.unique(state[AWAY])) | set(np.unique(state[SIDE])) <= {0, 1, 2}
     assert state[DIRECTION].max() <= 8

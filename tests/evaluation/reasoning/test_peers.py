@@ -18,7 +18,7 @@ def variable(name: str) -> dict[str, Any]:
     return {"op": "variable", "name": name}
 
 
-def case(**given: Any) -> dict[str, Any]:
+def case(**fields: Any) -> dict[str, Any]:
     since = {"op": "since", "bounds": [0, "inf"], "args": [variable("f"), variable("g")]}
     return {
         "id": "made-1",
@@ -30,11 +30,11 @@ def case(**given: Any) -> dict[str, Any]:
         "expected": [[0, 4], [1, 5], [2, 3]],
         "kind": "robustness",
         "semantics": ["past windows are cut at the first sample"],
-        **given,
+        **fields,
     }
 
 
-def test_each_outcome_is_told() -> None:
+def test_each_outcome_is_recognised() -> None:
     assert outcome_of(case()) == "agree"
     assert outcome_of(case(expected=[[2, 2]])) == "differ"
     asked = ["since and until ask for both a and b at the moment of b", *case()["semantics"]]
@@ -72,7 +72,7 @@ def test_a_folder_is_counted_by_peer_and_calculus(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not PEERS.is_dir(), reason="the shared cases of peers are not here")
-def test_all_shared_cases_are_as_the_page_says() -> None:
+def test_the_shared_cases_agree_as_documented() -> None:
     total = evaluate_peers(PEERS)["total"]
     assert total["differ"] == 0
     assert total["not_expressible"] < 0.01 * total["cases"]

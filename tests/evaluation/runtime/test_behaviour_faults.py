@@ -26,7 +26,7 @@ QUICK = sorted(FAULTS.keys() - WAITING - DEADLY)
 
 
 @pytest.mark.parametrize("fault", QUICK)
-def test_a_fault_within_the_process_is_told_and_nothing_reads_fine(fault: str) -> None:
+def test_a_fault_within_the_process_is_reported_and_nothing_reads_fine(fault: str) -> None:
     trial = BehaviourFaultTrial(
         QUICK.index(fault), fault, KINDS[len(fault) % len(KINDS)], False, 14
     )
@@ -36,7 +36,7 @@ def test_a_fault_within_the_process_is_told_and_nothing_reads_fine(fault: str) -
 
 
 @pytest.mark.parametrize("fault", sorted(WAITING | DEADLY))
-def test_a_fault_in_another_process_is_told_and_nothing_reads_fine(fault: str) -> None:
+def test_a_fault_in_another_process_is_reported_and_nothing_reads_fine(fault: str) -> None:
     trial = BehaviourFaultTrial(0, fault, "region", True, 14)
     run(trial)
     assert trial.problems == []
@@ -44,7 +44,7 @@ def test_a_fault_in_another_process_is_told_and_nothing_reads_fine(fault: str) -
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_campaign_sees_what_is_taken_for_known(
+def test_the_campaign_detects_unknown_percepts_taken_for_known(
     kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Let the mind forget what is unknown: then the campaign must find it out."""
@@ -66,7 +66,9 @@ def test_the_campaign_sees_what_is_taken_for_known(
     assert any(p.startswith("unknown: ") for p in trial.problems)
 
 
-def test_the_campaign_sees_rules_that_read_what_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_campaign_detects_rules_that_read_unknown_percepts(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr("visup.rules.safety.verdicts.inputs_missing", lambda mind, word: False)
     trial = BehaviourFaultTrial(0, "exception", "region", False, 14)
     run(trial)
@@ -81,7 +83,7 @@ def test_every_shipped_rule_reads_words_whose_inputs_are_known() -> None:
     assert not inputs_missing(Mind(unknown=frozenset({"lamp"})), "gap")
 
 
-def test_what_is_drawn_depends_on_the_seed_alone() -> None:
+def test_trials_depend_only_on_the_seed() -> None:
     assert [draw(n, 3) for n in range(40)] == [draw(n, 3) for n in range(40)]
     assert [draw(n, 3) for n in range(40)] != [draw(n, 4) for n in range(40)]
     assert {draw(n, 0).fault for n in range(len(FAULTS))} == set(FAULTS)

@@ -22,5 +22,5 @@ def test_a_short_run_measures_steps_replay_observers_and_minds(
         pace.evaluate_pace(59)
 
 
-def test_the_rules_of_the_measurement_are_twenty() -> None:
+def test_twenty_rules_are_measured() -> None:
     assert len(shipped_rules()) + len(parse_rules(pace.RULES)) == 20

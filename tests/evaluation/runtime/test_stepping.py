@@ -8,7 +8,9 @@ from visup.agent.model.errors import SettingsError
 from visup.evaluation.runtime.stepping import evaluate_stepping, missed_bars
 
 
-def test_a_short_course_has_all_figures_and_misses_no_bar(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_short_timeline_has_all_figures_and_meets_the_bars(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     small = {"MIN_STEPS": 150, "BACK_STEPS": 60, "BLOCK": 10, "BLOCKS": 2, "VISITS": 4}
     for name, value in small.items():
         monkeypatch.setattr(f"visup.evaluation.runtime.stepping.{name}", value)
@@ -20,10 +22,10 @@ def test_a_short_course_has_all_figures_and_misses_no_bar(monkeypatch: pytest.Mo
         evaluate_stepping(10)
 
 
-def test_what_misses_a_bar_is_told() -> None:
+def test_missed_bars_are_listed() -> None:
     items = {"back": {"median_ms": 90.0, "most_ms": 250.0}}
-    told = missed_bars({"items": items, "total": {"kept_mb": 300.0, "same": 0.5}})
-    assert [t.split(" the bar")[0] for t in told] == [
+    sentences = missed_bars({"items": items, "total": {"kept_mb": 300.0, "same": 0.5}})
+    assert [t.split(" the bar")[0] for t in sentences] == [
         "back(500) took 250 ms,",
         "10000 steps keep 300 MB,",
         "steps after going back differ from those before",

@@ -24,7 +24,7 @@ from visup.evaluation.serving.streams import FaultyStream
 from visup.percepts.video import open_source
 
 
-def test_a_stream_is_a_camera_that_is_watched_live() -> None:
+def test_a_stream_is_opened_as_a_live_camera() -> None:
     frames = scene(1)
     assert (frames[CROSSING // 2] != frames[-1]).any()
     assert (frames[-1] == frames[-2]).all()
@@ -38,7 +38,7 @@ def test_a_stream_is_a_camera_that_is_watched_live() -> None:
         stream.close()
 
 
-def test_a_receiver_refuses_what_comes_while_it_is_down() -> None:
+def test_a_receiver_refuses_records_while_it_is_down() -> None:
     receiver = AlertReceiver()
     try:
         sent = {"record": "alert"}
@@ -57,11 +57,11 @@ def test_a_receiver_refuses_what_comes_while_it_is_down() -> None:
 
 
 def record(number: int, state: str, delivery: str, camera: str = "cell") -> dict[str, Any]:
-    told = {"record": "alert", "camera": camera, "id": number, "opened": float(number)}
-    return {**told, "state": state, "delivery": delivery}
+    fields = {"record": "alert", "camera": camera, "id": number, "opened": float(number)}
+    return {**fields, "state": state, "delivery": delivery}
 
 
-def test_what_was_lost_told_twice_or_has_no_evidence_is_counted(tmp_path: Path) -> None:
+def test_lost_and_duplicate_alerts_and_missing_evidence_are_counted(tmp_path: Path) -> None:
     run = tmp_path / "cell" / "20260101T000000Z"
     (run / "evidence").mkdir(parents=True)
     (run / "evidence" / "alert-1.json").write_text('{"id": 1, "opened": 1.0}')
@@ -70,13 +70,13 @@ def test_what_was_lost_told_twice_or_has_no_evidence_is_counted(tmp_path: Path) 
         Alert(n, "seen", Severity.WARNING, float(n), float(n), (), "Seen.", closed=end)
         for n, end in ((1, 5.0), (2, None), (3, None))
     ]
-    seen = Observation(0, 6.0, (8, 8), ())
-    journal.record(Step(0, 6.0, seen, Mind(time=6.0), alerts=tuple(alerts)))
+    observation = Observation(0, 6.0, (8, 8), ())
+    journal.record(Step(0, 6.0, observation, Mind(time=6.0), alerts=tuple(alerts)))
     journal.close()
-    unbegun = tmp_path / "cell" / "20260101T000500Z"
-    unbegun.mkdir()
-    (unbegun / "journal.sqlite").touch()  # killed before its first line
-    taken = [
+    unstarted = tmp_path / "cell" / "20260101T000500Z"
+    unstarted.mkdir()
+    (unstarted / "journal.sqlite").touch()  # killed before its first line
+    received = [
         record(1, "opened", "a"),
         record(1, "closed", "b"),
         record(2, "opened", "c"),
@@ -89,32 +89,32 @@ def test_what_was_lost_told_twice_or_has_no_evidence_is_counted(tmp_path: Path) 
     auditor.read_store()
     (run / "journal.sqlite").unlink()  # for lack of room
     auditor.read_store()
-    account = auditor.audit(taken)
-    assert (account.alerts, account.lost, account.twice, account.resent) == (3, 1, 2, 1)
-    assert (account.unrecorded, account.without_evidence) == (1, 2)
+    audit = auditor.audit(received)
+    assert (audit.alerts, audit.lost, audit.twice, audit.resent) == (3, 1, 2, 1)
+    assert (audit.unrecorded, audit.without_evidence) == (1, 2)
 
 
-def test_a_rehearsal_fails_for_what_was_lost_or_late() -> None:
+def test_a_rehearsal_fails_if_alerts_are_lost_or_cameras_late() -> None:
     fine = {"lost": 0, "twice": 1, "resent": 1, "slowest_s": 9.9, "not_back": 0}
     assert not failed({"total": fine})
     for wrong in ({"lost": 1}, {"twice": 2}, {"slowest_s": 10.1}, {"not_back": 1}):
         assert failed({"total": {**fine, **wrong}})
 
 
-def test_things_are_done_when_they_are_due() -> None:
-    done: list[tuple[str, float]] = []
+def test_actions_are_performed_when_they_are_due() -> None:
+    actions: list[tuple[str, float]] = []
     now = 0.0
     table = Timetable(
-        ((10.0, lambda: done.append(("a", now))), (25.0, lambda: done.append(("b", now))))
+        ((10.0, lambda: actions.append(("a", now))), (25.0, lambda: actions.append(("b", now))))
     )
     for second in range(60):
         now = float(second)
         table.tick(now)
     expected = [("a", t) for t in (10.0, 20.0, 30.0, 40.0, 50.0)] + [("b", 25.0), ("b", 50.0)]
-    assert sorted(done) == expected
+    assert sorted(actions) == expected
 
 
-def test_who_was_killed_is_back_with_the_next_frame(tmp_path: Path) -> None:
+def test_a_killed_camera_has_recovered_with_its_next_frame(tmp_path: Path) -> None:
     killer = ProcessKiller(tmp_path, ["cell"], 0)
     killer.kill_one({"cell": 5.0})
     assert killer.kills == []  # there is no such process

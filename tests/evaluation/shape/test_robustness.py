@@ -53,7 +53,7 @@ def test_a_campaign_is_the_same_for_the_same_seed(tmp_path: Path) -> None:
         assert contents[0] == contents[1] != sound, kind
 
 
-def test_what_goes_wrong_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_failures_are_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     sound = sound_database(tmp_path / "sound.db", 0)
 
     def breaks(path: Path) -> ModelDatabase:
@@ -67,7 +67,7 @@ def test_what_goes_wrong_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert "ZeroDivisionError" in try_mask(sound, 0, 0, 64).what
 
 
-def test_the_largest_mask_is_no_worse_than_another() -> None:
+def test_the_largest_masks_are_normalised() -> None:
     for kind in ("noise", "checkered", "combed"):
         mask = odd_mask(kind, (4000, 4000), np.random.default_rng(1))
         silhouette = normalise(mask)  # type: ignore[arg-type]
@@ -83,7 +83,7 @@ def test_a_mask_of_another_type_is_refused(dtype: str) -> None:
 
 
 @pytest.mark.parametrize("dtype", ["u1", "i8", "u2", "i1"])
-def test_whole_numbers_are_taken_as_yes_and_no(dtype: str) -> None:
+def test_integer_masks_are_read_as_zero_or_not(dtype: str) -> None:
     expected = normalise(ZOO["star"])
     # The value 256 is not zero, though its lowest byte is.
     found = normalise(ZOO["star"].astype(dtype) * np.array(64 if dtype[1] == "1" else 256, dtype))
@@ -92,7 +92,7 @@ def test_whole_numbers_are_taken_as_yes_and_no(dtype: str) -> None:
     np.testing.assert_array_equal(found.contour, expected.contour)
 
 
-def test_the_command_tells_a_table() -> None:
+def test_the_command_prints_a_table() -> None:
     result = CliRunner().invoke(eval_app(), ["robustness", "--files", "12", "--masks", "12"])
     assert result.exit_code == 0, result.output
     assert "flipped" in result.output

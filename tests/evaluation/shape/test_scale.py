@@ -20,7 +20,7 @@ from visup.percepts.shape.index.view_index import ViewIndex, ViewSummaries
 from visup.percepts.shape.matching.shape_similarity import Shape, compare_shapes
 
 
-def apart(a: np.ndarray, b: np.ndarray) -> float:
+def brute_force_distance(a: np.ndarray, b: np.ndarray) -> float:
     """Distance of two sketches by a plain loop."""
     a, b = a / 127.0, b / 127.0
     sides = (b, b[::-1, ::-1])
@@ -31,17 +31,17 @@ def apart(a: np.ndarray, b: np.ndarray) -> float:
 
 @settings(max_examples=10, deadline=None)
 @given(FLOWERS, LIMBS)
-def test_sketches_are_compared_as_by_a_plain_loop(
+def test_sketch_distances_agree_with_a_plain_loop(
     lobes: tuple[tuple[int, float], ...], angles: tuple[float, ...]
 ) -> None:
     a, b = (sketch(shape(m).heights) for m in (flower(lobes), limbs(angles)))
     found = sketch_distances(a, np.stack([a, b]))
-    assert found == pytest.approx([0.0, apart(a, b)], abs=2e-3)
+    assert found == pytest.approx([0.0, brute_force_distance(a, b)], abs=2e-3)
 
 
 @settings(max_examples=10, deadline=None)
 @given(LIMBS, st.integers(0, POINTS - 1), st.booleans())
-def test_a_spectrum_does_not_tell_where_a_sketch_starts(
+def test_a_spectrum_does_not_depend_on_where_a_sketch_starts(
     angles: tuple[float, ...], start: int, mirrored: bool
 ) -> None:
     one = sketch(shape(limbs(angles)).heights)
@@ -65,7 +65,7 @@ def test_deformed_views_are_the_same_for_a_seed_and_unlike_their_source() -> Non
     assert one.graph.weights.sum() == pytest.approx(1.0, abs=1e-4)
 
 
-def test_the_sieves_keep_what_exhaustive_search_finds(many: ModelDatabase) -> None:
+def test_the_index_keeps_the_best_match_of_exhaustive_search(many: ModelDatabase) -> None:
     queries = [limbs((0.3, 1.2, 2.0, 4.1)), flower(((5, 0.3),)), flower(((3, 0.35), (1, 0.1)))]
     for mask in queries:
         query = shape(mask)
@@ -84,12 +84,12 @@ def test_summaries_in_the_file_are_those_of_the_shapes(many: ModelDatabase) -> N
     assert np.abs(rows["sketch"].astype(int) - fresh.sketches).max() <= 2
 
 
-def test_only_candidates_are_ever_read(many: ModelDatabase) -> None:
-    asked: set[int] = set()
+def test_only_candidates_are_read(many: ModelDatabase) -> None:
+    read: set[int] = set()
 
     class Reads(list[Shape]):
         def __getitem__(self, key: object) -> Shape:  # type: ignore[override]
-            asked.add(int(key))  # type: ignore[call-overload]
+            read.add(int(key))  # type: ignore[call-overload]
             return many.shapes[int(key)]  # type: ignore[call-overload]
 
         def __len__(self) -> int:
@@ -99,11 +99,11 @@ def test_only_candidates_are_ever_read(many: ModelDatabase) -> None:
     shapes = Reads()
     index = ViewIndex(shapes, summaries=ViewSummaries.read(rows))
     found = index.candidates(shape(ZOO["star"]), None, 20)
-    assert asked == set(found.numbers.tolist())
-    assert len(asked) == 20
+    assert read == set(found.numbers.tolist())
+    assert len(read) == 20
 
 
-def test_a_budget_in_time_is_kept_by_comparing_fewer_views_the_likeliest_first(
+def test_a_time_budget_is_met_by_comparing_the_likeliest_views_first(
     many: ModelDatabase,
 ) -> None:
     asked = [shape(ZOO["walker"]), shape(ZOO["star"])]

@@ -36,7 +36,7 @@ def test_a_solid_without_symmetry_has_none() -> None:
     assert len(silhouette_symmetries(wedge())) == 1
 
 
-def test_a_cylinder_looks_alike_from_all_round() -> None:
+def test_a_cylinder_looks_the_same_from_all_sides() -> None:
     symmetries = silhouette_symmetries(trimesh.creation.cylinder(0.5, 3.0))
     for degrees in (10.0, 75.0, 160.0):
         direction = Rotation.from_rotvec(Z * np.radians(degrees)).apply(X)
@@ -65,9 +65,9 @@ def test_a_box_turned_by_half_is_the_same() -> None:
         assert angle_to(direction * flip, direction, symmetries) < 1
 
 
-def test_queries_are_as_they_are_told_to_be() -> None:
-    asked = draw_queries("wedge", wedge(), 12, seed=3)
-    for query in asked:
+def test_queries_have_the_requested_size_and_cut() -> None:
+    queries = draw_queries("wedge", wedge(), 12, seed=3)
+    for query in queries:
         assert set(query.masks) == set(CONDITIONS)
         assert np.linalg.norm(query.direction) == pytest.approx(1)
         clean, cut = query.masks["clean"], query.masks["cut"]
@@ -79,13 +79,14 @@ def test_queries_are_as_they_are_told_to_be() -> None:
         assert not any(side.any() for side in (clean[0], clean[-1], clean[:, 0], clean[:, -1]))
     again = draw_queries("wedge", wedge(), 12, seed=3)
     assert all(
-        np.array_equal(a.masks["both"], b.masks["both"]) for a, b in zip(asked, again, strict=True)
+        np.array_equal(a.masks["both"], b.masks["both"])
+        for a, b in zip(queries, again, strict=True)
     )
     other = draw_queries("wedge", wedge(), 12, seed=4)
-    assert not np.allclose(asked[0].direction, other[0].direction)
+    assert not np.allclose(queries[0].direction, other[0].direction)
 
 
-def test_noise_displaces_a_straight_outline_by_as_much() -> None:
+def test_noise_displaces_a_straight_outline_by_its_sigma() -> None:
     """So does the height of a long edge, where displacements change slowly along it."""
     mask = np.zeros((200, 1200), dtype=bool)
     mask[100:] = True
@@ -94,30 +95,32 @@ def test_noise_displaces_a_straight_outline_by_as_much() -> None:
     assert float(heights.std()) == pytest.approx(3.0, rel=0.25)
 
 
-def test_noise_that_would_leave_nothing_leaves_all() -> None:
+def test_a_mask_that_noise_would_erase_is_kept() -> None:
     speck = np.zeros((20, 20), dtype=bool)
     speck[10, 10] = True
     assert with_contour_noise(speck, 8.0, 2.0, np.random.default_rng(0)).any()
 
 
 @pytest.mark.parametrize("side", range(4))
-def test_a_border_takes_its_share(side: int) -> None:
+def test_a_border_cuts_off_its_share(side: int) -> None:
     y, x = np.mgrid[-50:51, -50:51]
     disc = np.hypot(x, y) < 45
     cut = cut_by_border(disc, 0.3, side)
     assert cut.sum() / disc.sum() == pytest.approx(0.7, abs=0.02)
 
 
-def test_turning_turns_clockwise() -> None:
+def test_rotation_is_clockwise() -> None:
     arrow = np.zeros((60, 60), dtype=bool)
     arrow[28:32, 5:55] = arrow[20:40, 45:55] = True
-    seen = rotated_and_scaled(arrow, np.pi / 2, 100.0)
-    rows = np.flatnonzero(seen.any(axis=1))
-    thickness = seen.sum(axis=1)
+    rotated = rotated_and_scaled(arrow, np.pi / 2, 100.0)
+    rows = np.flatnonzero(rotated.any(axis=1))
+    thickness = rotated.sum(axis=1)
     assert thickness[rows[-8:]].mean() > 2 * thickness[rows[:8]].mean()
 
 
-def test_figures_of_plain_solids(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_plain_solids_are_recognised_with_all_figures(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A ball, a rod and a plate are told apart; each figure is where the data's README says."""
     pytest.importorskip("mahotas", reason="the extra visup[eval] is not installed")
     from visup.evaluation.shape.view_recognition import evaluate_views

@@ -13,32 +13,36 @@ from visup.evaluation.simulation.view_noise import NoisyViews, ViewNoise
 from visup.percepts.shape.building.mesh_views import half_sphere_directions
 
 
-def looks(
+def view_errors(
     noise: ViewNoise, count: int = 600, others: tuple[str, ...] = ("mir",)
 ) -> list[list[float]]:
     """For each look the angles of its hypotheses from the truth, degrees; inf for another model."""
-    told = NoisyViews("sat", half_sphere_directions(48), noise, np.random.default_rng(1), others)
-    found = []
+    source = NoisyViews("sat", half_sphere_directions(48), noise, np.random.default_rng(1), others)
+    errors = []
     for k, true in enumerate(Rotation.random(count, random_state=2).as_matrix()):
-        said = told(true, k)
-        seen = [orientations(h.direction or (1, 0, 0), h.rotation or 0.0) for h in said]
-        swings = [float(np.degrees(swing_and_roll(s, true)[0])) for s in seen]
-        found.append([a if h.name == "sat" else np.inf for h, a in zip(said, swings, strict=True)])
-    return found
+        hypotheses = source(true, k)
+        orientations_ = [
+            orientations(h.direction or (1, 0, 0), h.rotation or 0.0) for h in hypotheses
+        ]
+        swings = [float(np.degrees(swing_and_roll(s, true)[0])) for s in orientations_]
+        errors.append(
+            [a if h.name == "sat" else np.inf for h, a in zip(hypotheses, swings, strict=True)]
+        )
+    return errors
 
 
 def test_without_noise_the_nearest_view_comes_first() -> None:
     clean = ViewNoise(missing=0, wrong=0, twin=0, roll_deg=0, similarity_sigma=0)
-    for angles in looks(clean):
+    for angles in view_errors(clean):
         assert angles[0] < 20.0
         assert angles == sorted(angles)
 
 
-def test_so_many_are_missing_and_wrong_as_asked_for() -> None:
-    found = looks(ViewNoise(missing=0.2, wrong=0.3, wrong_run=2.0, twin=0.0), count=3000)
-    said = [angles for angles in found if angles]
-    assert 1 - len(said) / len(found) == pytest.approx(0.2, abs=0.03)
-    wrong = np.mean([angles[0] > 45.0 for angles in said])
+def test_missing_and_wrong_reports_have_the_requested_rates() -> None:
+    reports = view_errors(ViewNoise(missing=0.2, wrong=0.3, wrong_run=2.0, twin=0.0), count=3000)
+    answered = [angles for angles in reports if angles]
+    assert 1 - len(answered) / len(reports) == pytest.approx(0.2, abs=0.03)
+    wrong = np.mean([angles[0] > 45.0 for angles in answered])
     assert wrong == pytest.approx(0.3, abs=0.05)
 
 

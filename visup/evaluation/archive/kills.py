@@ -133,19 +133,19 @@ class RandomKills:
     """Kills processes of the command at random moments.
 
     Args:
-        wanted: Number of kills for each of `KINDS`.
+        wanted: Number of kills for each of `KILL_TARGETS`.
         pause_s: The longest time between two kills.
         rng: Random generator.
     """
 
-    def __init__(self, wanted: Mapping[str, int], pause_s: float, rng: Random) -> None:
-        self._wanted, self._pause_s, self._rng = wanted, pause_s, rng
-        self.done = dict.fromkeys(wanted, 0)
+    def __init__(self, counts: Mapping[str, int], pause_s: float, rng: Random) -> None:
+        self._counts, self._pause_s, self._rng = counts, pause_s, rng
+        self.done = dict.fromkeys(counts, 0)
 
     @property
     def left(self) -> dict[str, int]:
         """Remaining kills by kind."""
-        left = {kind: self._wanted[kind] - self.done[kind] for kind in self._wanted}
+        left = {kind: self._counts[kind] - self.done[kind] for kind in self._counts}
         return {kind: count for kind, count in left.items() if count > 0}
 
     def kill_during(self, process: subprocess.Popen[bytes]) -> None:

@@ -137,8 +137,8 @@ def evaluate_archive(
     Raises:
         SettingsError: There is no such part, or no mission.
     """
-    wanted = list(part or PARTS)
-    if unknown := sorted({*wanted} - {*PARTS}):
+    parts = list(part or PARTS)
+    if unknown := sorted({*parts} - {*PARTS}):
         raise SettingsError(
             f"there is no part '{unknown[0]}'", expected=f"some of: {', '.join(PARTS)}"
         )
@@ -147,7 +147,7 @@ def evaluate_archive(
         evaluation = _Evaluation(
             missions, ArchiveSizes(**sizes), seed, Path(scratch), progress, models
         )
-        items = {name: dict(PARTS[name](evaluation)) for name in wanted}
+        items = {name: dict(PARTS[name](evaluation)) for name in parts}
     return {"items": items, "total": {"different": sum(_different(i) for i in items.values())}}
 
 

@@ -34,7 +34,7 @@ def inject(frames: Sequence[Frame], start: int, kind: str, seed: int) -> list[Fr
     Args:
         frames: A good clip.
         start: Index in `frames` of the first frame with the fault.
-        kind: A key of `EXPECTED`.
+        kind: A key of `EXPECTED_STATUS`.
         seed: Random seed.
 
     Returns:

@@ -39,7 +39,7 @@ class CameraFaultTrial:
 
     Attributes:
         source: The video.
-        kind: A key of `EXPECTED`.
+        kind: A key of `EXPECTED_STATUS`.
         skip: Position of the clip in the video, 0 to 1.
         fault_free_s: Seconds before the fault.
         seed: Random seed of the fault.

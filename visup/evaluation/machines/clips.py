@@ -51,14 +51,14 @@ def clip_folders(folder: Path) -> list[Path]:
     Raises:
         SettingsError: There is none.
     """
-    found = sorted(p.parent for p in folder.rglob("brief.json"))
-    if not found:
+    folders = sorted(p.parent for p in folder.rglob("brief.json"))
+    if not folders:
         raise SettingsError(
             "no clip here has a brief",
             where=str(folder),
             expected="folders with brief.json, truth.json and clip.mp4 or video.mp4",
         )
-    return found
+    return folders
 
 
 def read_brief(folder: Path) -> Brief:

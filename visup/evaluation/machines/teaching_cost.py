@@ -49,7 +49,7 @@ def evaluate_teaching(
     """The time of a step with and without five taught objects at rest, and of teaching one.
 
     Args:
-        frames: Number of frames, including `WARM` frames of warm-up.
+        frames: Number of frames, including `WARM_UP_FRAMES` frames of warm-up.
         seed: Random seed.
         progress: Shows what is being done.
 

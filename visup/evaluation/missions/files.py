@@ -15,15 +15,15 @@ def mission_folders(folder: Path) -> list[Path]:
     Raises:
         SettingsError: There is none.
     """
-    found = [folder] if (folder / "mission.json").is_file() else []
-    found += sorted(p.parent for p in folder.glob("*/mission.json"))
-    if not found:
+    missions = [folder] if (folder / "mission.json").is_file() else []
+    missions += sorted(p.parent for p in folder.glob("*/mission.json"))
+    if not missions:
         raise SettingsError(
             "there is no mission here",
             where=str(folder),
             expected="mission.json, video.mp4, masks/ and truth.json, or folders that hold them",
         )
-    return found
+    return missions
 
 
 def read_json(path: Path) -> dict[str, Any]:
@@ -34,8 +34,8 @@ def read_json(path: Path) -> dict[str, Any]:
     """
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as fault:
-        raise SettingsError(f"this cannot be read: {fault}", where=str(path)) from fault
+    except (OSError, ValueError) as error:
+        raise SettingsError(f"this cannot be read: {error}", where=str(path)) from error
     if not isinstance(data, dict):
         raise SettingsError(
             "this is not the file of a mission", where=str(path), expected="a JSON object"

@@ -1,7 +1,7 @@
 """`visup eval orbits`: random missions in orbit are rendered, supervised, scored and discarded.
 
-The models are all generated meshes except those of `UNKNOWN_MESHES`, which are correctly identified as unknown. The
-arm is known by silhouettes from missions that are not scored.
+The models are all generated meshes except those of `UNKNOWN_MESHES` and `SCENERY_MESHES`, which are
+correctly identified as unknown. The arm is known by silhouettes from missions that are not scored.
 """
 
 from __future__ import annotations

@@ -49,7 +49,7 @@ def evaluate_crowds(
     """The time of a frame by the number of moving objects.
 
     Args:
-        frames: Frames for each number of movers, including `UNTIMED` unmeasured ones.
+        frames: Frames for each number of movers, including `WARM_UP_FRAMES` unmeasured ones.
         seed: Random seed.
         progress: Shows what is being done.
 

@@ -3,11 +3,11 @@
 For users without an agent: `watch_boxes` updates the beliefs with the boxes of one frame. The evaluation and
 its noise thresholds are those of an agent, which measures motion on outlines instead.
 
->>> kept = Boxes()
+>>> beliefs = Boxes()
 >>> for t in range(75):
 ...     boxes = np.array([[100.0, 100, 40, 40], [300 - 2.5 * t, 100, 40, 40]])
-...     kept = watch_boxes(kept, (1, 2), boxes, t / 25)
->>> kept.rcc8_of(1, 2), kept.qtc_of(1, 2), kept.approach_of(1, 2)
+...     beliefs = watch_boxes(beliefs, (1, 2), boxes, t / 25)
+>>> beliefs.rcc8_of(1, 2), beliefs.qtc_of(1, 2), beliefs.approach_of(1, 2)
 ('partially_overlapping', '0-', 'converging')
 """
 
@@ -53,9 +53,8 @@ class BoxSettings:
         samples: Maximum samples in the window.
         bins: Maximum number of means of neighbouring samples for a line fit.
         fit_share: Weight of a fit's own deviation where it exceeds that of `noise_px`, since from so few
-            means
-            it is known only to about a third. With 5 sigmas to enter, a trend must exceed 5 deviations of the
-            noise and 3 of its own fit.
+            means it is known only to about a third. With 5 sigmas to enter, a trend must exceed 5 deviations
+            of the noise and 3 of its own fit.
     """
 
     thresholds: ThresholdSettings = field(default_factory=ThresholdSettings)

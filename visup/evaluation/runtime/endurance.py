@@ -81,14 +81,14 @@ def _reasoning_steps(
     rules = default_reasoners()
     reasoners: tuple[Reasoner, ...] = (*rules.update, *rules.cogitate)
     start = mind.time + 1.0 / FPS if mind.frame_index >= 0 else 0.0
-    for seen in drifting_boxes(count, frames, seed, start):
+    for observation in drifting_boxes(count, frames, seed, start):
         begin = time.perf_counter()
         mind = replace(
             mind,
-            time=seen.time,
-            frame_index=seen.frame_index,
-            frame_size=seen.frame_size,
+            time=observation.time,
+            frame_index=observation.frame_index,
+            frame_size=observation.frame_size,
         )
         for reasoner in reasoners:
-            mind = reasoner(mind, seen).mind
+            mind = reasoner(mind, observation).mind
         yield time.perf_counter() - begin, mind

@@ -51,12 +51,11 @@ def evaluate_stepping(
         progress: Shows what is being done.
 
     Returns:
-        `items` for going 'back' (by `BACK` steps, from anywhere), for `step` number n told without
-        going there ('look'), and for a 'branch' that is begun `BACK` steps ago: `median_ms` and
-        `most_ms` of processor time; `total` with `steps`, `kept_mb` (by how much the process has grown
-        over all steps, for 10,000 of them), `same` (the share of places at which the steps after
-        going back were byte for byte those before), and `slower` (processor time of a step made by
-        a stepper, by that of the agent alone).
+        `items` for going 'back' by `BACK_STEPS` steps, for reading an earlier step without going there
+        ('look'), and for starting a 'branch' `BACK_STEPS` steps ago: `median_ms` and `most_ms` of processor
+        time; `total` with `steps`, `kept_mb` (growth of the process, for 10,000 steps), `same` (share of
+        positions at which the steps after going back equal those before byte for byte), and `slower`
+        (processor time of a step by a stepper, relative to that of the agent alone).
 
     Raises:
         SettingsError: There are too few steps.
@@ -118,14 +117,14 @@ def _measure_visits(
 
 def missed_bars(figures: dict[str, Any]) -> list[str]:
     """The bars that figures miss, one sentence each."""
-    back, kept = figures["items"]["back"]["most_ms"], figures["total"]["kept_mb"]
+    back_ms, kept_mb = figures["items"]["back"]["most_ms"], figures["total"]["kept_mb"]
     missed = (
-        [f"back({BACK_STEPS}) took {back:.0f} ms, the bar is {MAX_BACK_MS:g}"]
-        if back > MAX_BACK_MS
+        [f"back({BACK_STEPS}) took {back_ms:.0f} ms, the bar is {MAX_BACK_MS:g}"]
+        if back_ms > MAX_BACK_MS
         else []
     )
-    if kept > MAX_KEPT_MB:
-        missed.append(f"{REFERENCE_STEPS} steps keep {kept:.0f} MB, the bar is {MAX_KEPT_MB:g}")
+    if kept_mb > MAX_KEPT_MB:
+        missed.append(f"{REFERENCE_STEPS} steps keep {kept_mb:.0f} MB, the bar is {MAX_KEPT_MB:g}")
     if figures["total"]["same"] < 1.0:
         missed.append("steps after going back differ from those before")
     return missed

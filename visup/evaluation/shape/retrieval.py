@@ -189,9 +189,9 @@ def _prune(
     compared, lost = np.zeros(len(shapes)), np.zeros(len(shapes))
     for i, shape in enumerate(shapes):
         others = indices[indices != i]
-        found = index.candidates(shape, others, limit).numbers
-        compared[i] = len(found) / len(others)
-        lost[i] = float(others[int(np.argmax(similarities[i, others]))] not in found)
+        candidates = index.candidates(shape, others, limit).numbers
+        compared[i] = len(candidates) / len(others)
+        lost[i] = float(others[int(np.argmax(similarities[i, others]))] not in candidates)
     return compared, lost
 
 

@@ -119,14 +119,14 @@ def evaluate_views(
 
 
 def _mesh_files(folder: Path, limit: int | None) -> list[Path]:
-    found = sorted(p for p in folder.iterdir() if p.suffix.lower() in MESHES)[:limit]
-    if not found:
+    files = sorted(p for p in folder.iterdir() if p.suffix.lower() in MESHES)[:limit]
+    if not files:
         raise SettingsError(
             "there are no meshes here",
             where=str(folder),
             expected=f"mesh files ({', '.join(MESHES)})",
         )
-    return found
+    return files
 
 
 def _machines(folder: Path) -> list[Path]:

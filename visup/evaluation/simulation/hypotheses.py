@@ -36,7 +36,7 @@ ABSENT_MODELS = (
 VIEWS = 32
 """Views per model, the default of `visup models build`; each also represents the opposite direction."""
 
-# Wrong names and looks without a name are chosen here: views have only their own noise.
+# Wrong names and reports without a name are drawn here: views have only their own noise.
 _NOISE = ViewNoise(missing=0.0, wrong=0.0)
 _DIRECTIONS = half_sphere_directions(VIEWS)
 _PERSISTENCE = 0.7  # probability that a wrong name persists within a run of wrong names

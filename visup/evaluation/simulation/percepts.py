@@ -188,7 +188,7 @@ class SimulatedSegmenter:
             yield Percept("region", region, frame.time, "truth", region.confidence)
 
     def _groups(self, frame: Frame) -> dict[tuple[str, ...], NDArray[np.bool_]]:
-        """Whole-image masks; no pixel belongs to two, that which is farther inside has it."""
+        """Whole-image masks; a pixel in several of them belongs to the one that it is deepest inside."""
         width, height = self.mission.size
         deepest = np.zeros((height, width), np.float32)
         owner = np.full((height, width), -1, np.int8)
@@ -225,10 +225,10 @@ class SimulatedSegmenter:
 
 @dataclass(slots=True)
 class SimulatedRecogniser:
-    """A behaviour that says of each region what it looks like, and how far it is.
+    """A behaviour that reports hypotheses and depth of each region.
 
     Attributes:
-        segmenter: What reports the regions.
+        segmenter: The behaviour that reports the regions.
     """
 
     segmenter: SimulatedSegmenter
@@ -259,7 +259,7 @@ class SimulatedRecogniser:
     def _reports(self, region: Region, index: int) -> Iterator[Hypothesis | Depth]:
         masks = self.segmenter.mission.masks[index]
         names = self.segmenter.true_names[region.id]
-        # What two bodies look like together is taken for the larger one, or for anything else.
+        # A region of two bodies is taken for the larger one, or for any other model.
         name = max(names, key=lambda n: masks[n].visible_px if n in masks else 0)
         yield from self._sources[name].report(region, index, alone=len(names) == 1)
 
@@ -267,17 +267,17 @@ class SimulatedRecogniser:
 def behaviours_of(
     mission: Mission, noise: PerceptNoise
 ) -> tuple[list[Behaviour], Mapping[int, tuple[str, ...]]]:
-    """What sees a mission's truth.
+    """Behaviours that report a mission's ground truth with noise.
 
     Returns:
-        The behaviours for an agent; and region id -> names of true objects, filled as it runs.
+        The behaviours for an agent; and region id -> names of true objects, filled while it runs.
     """
     segmenter = SimulatedSegmenter(mission, noise)
     return [segmenter, SimulatedRecogniser(segmenter)], segmenter.true_names
 
 
 def frames_of(mission: Mission, *, every: int = 1) -> Iterator[Frame]:
-    """Frames without a picture, for behaviours that see the truth."""
+    """Blank frames, for behaviours that read the ground truth."""
     width, height = mission.size
     blank = np.broadcast_to(np.zeros((1, 1, 1), np.uint8), (height, width, 3))
     for row in mission.truth["frames"][::every]:

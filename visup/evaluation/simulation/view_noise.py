@@ -1,8 +1,8 @@
 """View hypotheses simulated from true orientations, with the errors of matching.
 
 A model has views from directions spread over half the sphere, each also representing the opposite one
-(`half_sphere_directions`). A look reports the views nearest to the true direction with decreasing similarity;
-at random a neighbouring view comes first, or a completely different one, or there is none.
+(`half_sphere_directions`). Each report lists the views nearest to the true direction with decreasing
+similarity; at random a neighbouring view comes first, or a completely different one, or there is none.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ class ViewNoise:
     """The errors of hypotheses.
 
     Attributes:
-        missing: Share of looks without hypotheses.
-        wrong: Share of looks whose first hypothesis is wrong: another model, or another view.
-        wrong_run: Mean number of looks for which a wrong hypothesis persists.
-        twin: Share of looks with the mirror image mistaken for the view: the opposite direction.
+        missing: Share of reports without hypotheses.
+        wrong: Share of reports whose first hypothesis is wrong: another model, or another view.
+        wrong_run: Mean number of reports for which a wrong hypothesis persists.
+        twin: Share of reports with the mirror image mistaken for the view: the opposite direction.
         roll_deg: Standard deviation of the in-plane rotation.
         similarity: Similarity of a view seen from its own direction.
         fall: Loss of similarity at 20 degrees from it; it grows with the square of the angle.
         similarity_sigma: Standard deviation of each similarity.
-        top: Hypotheses of the right model in a look.
+        top: Hypotheses of the right model in a report.
     """
 
     missing: float = 0.15
@@ -46,7 +46,7 @@ class ViewNoise:
 
 
 class NoisyViews:
-    """Simulated hypotheses of one object, look by look.
+    """Simulated hypotheses of one object, report by report.
 
     Args:
         name: The object's model.
@@ -70,7 +70,7 @@ class NoisyViews:
         self._persistent_error: Hypothesis | None = None
 
     def __call__(self, orientation: Floats, region_id: int) -> tuple[Hypothesis, ...]:
-        """Hypotheses of one look, best first.
+        """Hypotheses of one report, best first.
 
         Args:
             orientation: (3, 3) true orientation, model to camera.
@@ -107,7 +107,7 @@ class NoisyViews:
         """A wrong hypothesis that is more similar than the right one, persistent over runs."""
         noise, rng = self.noise, self.rng
         persists = self._persistent_error is not None and rng.random() < 1.0 - 1.0 / noise.wrong_run
-        # Keeps the share of wrong looks independent of the length of runs.
+        # Keeps the share of wrong reports independent of the length of runs.
         begin = noise.wrong / (noise.wrong_run * (1.0 - noise.wrong))
         if not persists:
             self._persistent_error = None
