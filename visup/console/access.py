@@ -26,7 +26,7 @@ Send = Callable[[Message], Awaitable[None]]
 Application = Callable[[Scope, Receive, Send], Awaitable[None]]
 
 COOKIE = "visup_console"
-TOKEN_PARAMETER = "token"
+QUERY_PARAMETER = "token"
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]", "::1")
 ROLE_KEY = "visup_role"
 """Key of the role in the scope of a request."""
@@ -85,7 +85,7 @@ class AccessGuard:
         headers = _headers(scope["headers"])
         refusal = self._refusal_reason(headers)
         query = parse_qs(scope.get("query_string", b"").decode("latin-1"))
-        token = query.get(TOKEN_PARAMETER, [""])[0]
+        token = query.get(QUERY_PARAMETER, [""])[0]
         role = self._access.role(token or _token_in_cookie(headers.get("cookie", "")))
         if refusal or role is None:
             await _refuse(scope, send, refusal or _HOW_TO_OPEN, headers.get("accept", ""))
