@@ -183,7 +183,7 @@ def not_implied(actions: set[ActorsAction], others: set[ActorsAction]) -> set[Ac
     """The actions that none of the others is or implies: who is coupled touches and moves together.
 
     >>> pair = frozenset({"gripper", "part"})
-    >>> beyond({("touching", pair), ("diverging", pair)}, {("coupled", pair)}) == {("diverging", pair)}
+    >>> not_implied({("touching", pair), ("diverging", pair)}, {("coupled", pair)}) == {("diverging", pair)}
     True
     """
     return {
