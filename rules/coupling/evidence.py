@@ -9,7 +9,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from visup.agent import Column, Coupling, Mind, Presence, Region, RelationTable
+from visup.agent import (
+    CameraMotion,
+    Column,
+    Coupling,
+    Mind,
+    Observation,
+    Presence,
+    Region,
+    RelationTable,
+)
 from visup.agent.model.memory import MemoryKey
 from visup.agent.model.relation_columns import UNKNOWN_CODE, ColumnLayout, RelationBlock
 from visup.rules.coupling.contact import ContactSettings, Feet, OutlineContact
@@ -40,6 +49,7 @@ YES, MAYBE, NO = 1, 0, -1
 """Codes of truth values: true, unknown, false."""
 
 Pair = tuple[int, int]
+Camera = CameraMotion | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -133,6 +143,12 @@ def own_speed(mind: Mind, number: int) -> float | None:
     if body.last_seen == mind.time and body.region.velocity_sigma > 0.0:
         speeds.append(float(np.hypot(*body.region.velocity)))
     return min((s for s in speeds if s == s), default=None)  # NaN is not equal to itself
+
+
+def camera_motion(observation: Observation) -> Camera:
+    """The image motion of the static scene since the previous frame; None if it rests or is unknown."""
+    motions: Sequence[CameraMotion] = observation.of("camera")
+    return motions[-1] if motions and not np.array_equal(motions[-1].motion, np.eye(2, 3)) else None
 
 
 def observed_pairs(table: RelationTable, mind: Mind) -> list[PairObservation]:

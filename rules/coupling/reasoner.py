@@ -41,9 +41,11 @@ from visup.rules.coupling.evidence import (
     NO,
     NO_EVIDENCE,
     YES,
+    Camera,
     CouplingEvidence,
     Pair,
     PairObservation,
+    camera_motion,
     common_speed,
     coupling_cells,
     feet_of,
@@ -143,14 +145,14 @@ class CouplingReasoner(ExplainableReasoner):
         coupled = {c.objects: c for c in mind.couplings}
         table = relation_table(mind)
         observed = observed_pairs(table, mind)
-        touching, s = touching_bodies(observed), self.settings
+        touching, camera, s = touching_bodies(observed), camera_motion(observation), self.settings
         carriers = update_carriers(mind.recall(CARRIERS), touching, mind, s.carriers)
         carried = carriers.carried_since()
         new_evidence: dict[Pair, CouplingEvidence] = {}
         events: list[Event] = []
         for seen in observed:
             pair = seen.pair
-            evidence = self._update_evidence(old.get(pair, NO_EVIDENCE), seen, mind)
+            evidence = self._update_evidence(old.get(pair, NO_EVIDENCE), seen, mind, camera)
             start = carried.get(pair)
             if start is not None and evidence.was_decoupled_since(start):
                 start = None
@@ -179,11 +181,11 @@ class CouplingReasoner(ExplainableReasoner):
         return Outcome(mind, tuple(e for e in events if not mind.one_machine(*e.objects)))
 
     def _update_evidence(
-        self, before: CouplingEvidence, seen: PairObservation, mind: Mind
+        self, before: CouplingEvidence, seen: PairObservation, mind: Mind, camera: Camera
     ) -> CouplingEvidence:
         """The evidence on a pair updated with one observation; `before` itself if nothing changes."""
         converging = seen.converging == YES and seen.touching != YES
-        track = self._update_track(before.relative_track, seen, mind)
+        track = self._update_track(before.relative_track, seen, mind, camera)
         odds, contact, found = before.rest_odds, before.contact, None
         if track is not None and track is not before.relative_track:
             found = relative_velocity(track, mind.time, self.settings.window_s)
@@ -226,7 +228,7 @@ class CouplingReasoner(ExplainableReasoner):
         return before.apart_path + speed * dt
 
     def _update_track(
-        self, before: RelativeTrack | None, seen: PairObservation, mind: Mind
+        self, before: RelativeTrack | None, seen: PairObservation, mind: Mind, camera: Camera
     ) -> RelativeTrack | None:
         """The updated relative track of a pair; None if it is not near, or has not been seen for long.
 
@@ -251,7 +253,8 @@ class CouplingReasoner(ExplainableReasoner):
             # merged region.
             return begin_relative_track(regions_apart(seen.pair, mind), mind.time, mind.frame_size)
         ages = {"lasts_s": s.path_s, "outline_age_s": s.outline_age_s}
-        return update_relative_track(before, regions, mind.time, mind.frame_size, **ages)
+        now, size = mind.time, mind.frame_size
+        return update_relative_track(before, regions, now, size, camera=camera, **ages)
 
     def _rest_odds(
         self,

@@ -20,7 +20,7 @@ from math import hypot, log
 
 import numpy as np
 
-from visup.agent import Region
+from visup.agent import CameraMotion, Region
 from visup.agent.model.fast_replace import replace
 from visup.rules.coupling._relative_motion_jit import first_recent, fused_velocity
 from visup.rules.geometry._outlines_jit import near_outline, register, run_boxes
@@ -82,14 +82,16 @@ class RelativeTrack:
         second: Outline of the second body.
         since: Time when the outlines were stored, seconds.
         before: (x, y) displacement accumulated with earlier outlines up to then, pixels.
-        path: (time, x, y, vx, vy, variance): displacement of the second relative to the first, pixels,
-            and its velocity by image motion, pixels per second; NaN where unknown. Oldest first.
+        camera: (x, y) displacement of the second relative to the first by a camera that zooms, pixels.
+        path: (time, x, y, vx, vy, variance): displacement of the second relative to the first except by the
+            camera, pixels, and its velocity by image motion, pixels per second; NaN: unknown. Oldest first.
     """
 
     first: OutlineTemplate
     second: OutlineTemplate
     since: float
     before: Vector = (0.0, 0.0)
+    camera: Vector = (0.0, 0.0)
     path: tuple[tuple[float, ...], ...] = ()
 
     @property
@@ -213,6 +215,7 @@ def update_relative_track(
     *,
     lasts_s: float,
     outline_age_s: float,
+    camera: CameraMotion | None = None,
 ) -> RelativeTrack | None:
     """Update the relative track of two bodies with an observation of both.
 
@@ -223,6 +226,7 @@ def update_relative_track(
         size: (width, height) of the image, pixels.
         lasts_s: Length of the path, seconds.
         outline_age_s: Age at which outlines are replaced, since bodies rotate, seconds.
+        camera: Image motion of the static scene since the previous frame; None if unknown.
 
     Returns:
         The track with one more position; None when the two cannot be tracked.
@@ -238,14 +242,31 @@ def update_relative_track(
             _restart_track(track, regions, now, size, lasts_s) if apart else replace(track, path=())
         )
     x, y = (b + s - f for b, s, f in zip(track.before, second.shift, first.shift, strict=True))
+    dx, dy = _moved_by_camera(first, second, camera)
+    cx, cy = track.camera[0] + dx, track.camera[1] + dy
     local = first.local or second.local
-    place = (now, x, y, *(UNKNOWN_MOTION if local else _image_motion(regions)))
+    vx, vy, variance = UNKNOWN_MOTION if local else _image_motion(regions)
+    if dt > 0.0:
+        vx, vy = vx - dx / dt, vy - dy / dt
+    place = (now, x - cx, y - cy, vx, vy, variance)
     path = (*(p for p in track.path if p[0] > now - lasts_s), place)
     if apart and now - track.since > outline_age_s:
         fresh = begin_relative_track(regions, now, size)
         if fresh is not None:
-            return replace(fresh, before=(x, y), path=path)
-    return replace(track, first=first, second=second, path=path)
+            return replace(fresh, before=(x, y), camera=(cx, cy), path=path)
+    return replace(track, first=first, second=second, camera=(cx, cy), path=path)
+
+
+def _moved_by_camera(
+    first: OutlineTemplate, second: OutlineTemplate, camera: CameraMotion | None
+) -> Vector:
+    """(x, y) by which the camera alone displaces the second of two outlines relative to the first, pixels."""
+    if camera is None:
+        return 0.0, 0.0
+    (ax, ay), (bx, by) = (
+        camera.displacement(o.points.mean(axis=0) + o.shift) for o in (first, second)
+    )
+    return float(bx - ax), float(by - ay)
 
 
 def _track_outline(kept: OutlineTemplate, region: Region, dt: float) -> OutlineTemplate | None:
@@ -277,7 +298,8 @@ def _restart_track(
     then, x, y, *_ = track.path[-1]
     place = (now, x + motion[0] * (now - then), y + motion[1] * (now - then), *motion)
     path = (*(p for p in track.path if p[0] > now - lasts_s), place)
-    return replace(fresh, before=place[1:3], path=path)
+    cx, cy = track.camera
+    return replace(fresh, before=(place[1] + cx, place[2] + cy), camera=track.camera, path=path)
 
 
 def begin_relative_track(

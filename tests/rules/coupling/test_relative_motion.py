@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.stats import multivariate_normal
 
 from tests.rules.scenes import SIZE, box_region
-from visup.agent import Region
+from visup.agent import CameraMotion, Region
 from visup.agent.model.fast_replace import replace
 from visup.rules.coupling.relative_motion import (
     OutlineTemplate,
@@ -201,6 +201,39 @@ def test_boxes_that_move_apart_are_followed(speed: float, known: bool) -> None:
     assert found is not None
     assert found.velocity[0] == pytest.approx(speed, rel=0.02, abs=1.0)
     assert found.rest_odds(STILL, MOVING) < -5.0
+
+
+@pytest.mark.parametrize("known", [False, True])
+@pytest.mark.parametrize("rate", [1.004, 0.996, 1.0])
+def test_bodies_at_rest_before_a_zooming_camera_are_at_rest(rate: float, known: bool) -> None:
+    """Zoomed by a tenth in a second, bodies 200 pixels apart move apart by 20 pixels a second."""
+    camera = CameraMotion(np.array([[rate, 0.0, 0.0], [0.0, rate, 0.0]]))
+    frames, found = 30, {}
+    for given_camera in (camera, None):
+        followed = begin_relative_track(two_boxes(1.0, 1.0, known), 0.0, SIZE)
+        for k in range(1, frames):
+            regions = two_boxes(rate**k, rate, known)
+            followed = update_relative_track(
+                followed, regions, k / 25, SIZE, lasts_s=1.2, outline_age_s=0.5, camera=given_camera
+            )
+        assert followed is not None
+        velocity = relative_velocity(followed, (frames - 1) / 25, 0.3)
+        assert velocity is not None
+        found[given_camera is None] = velocity
+    assert np.hypot(*found[False].velocity) < 3.0
+    if rate != 1.0:
+        assert np.hypot(*found[True].velocity) > 12.0
+
+
+def two_boxes(zoom: float, rate: float, known: bool) -> tuple[Region, Region]:
+    """Two boxes 200 pixels apart, in a picture magnified about its corner."""
+    sigma, found = 1.0 if known else 0.0, []
+    for number, x in enumerate((150.0, 350.0), 1):
+        region = box_region(number, (x * zoom, 150 * zoom, 80 * zoom, 60 * zoom))
+        assert region is not None
+        speed = 25 * (rate - 1) * zoom * np.array([x + 40, 180])
+        found.append(replace(region, velocity=tuple(speed.tolist()), velocity_sigma=sigma))
+    return found[0], found[1]
 
 
 @given(st.floats(-60, 60), st.floats(-60, 60))
