@@ -252,9 +252,8 @@ class CouplingReasoner(ExplainableReasoner):
             # Never seen side by side: the track starts from the last region of the hidden body and from the
             # merged region.
             return begin_relative_track(regions_apart(seen.pair, mind), mind.time, mind.frame_size)
-        ages = {"lasts_s": s.path_s, "outline_age_s": s.outline_age_s}
-        now, size = mind.time, mind.frame_size
-        return update_relative_track(before, regions, now, size, camera=camera, **ages)
+        now, size, ages = mind.time, mind.frame_size, (s.path_s, s.outline_age_s)
+        return update_relative_track(before, regions, now, size, ages, camera)
 
     def _rest_odds(
         self,

@@ -212,9 +212,7 @@ def update_relative_track(
     regions: tuple[Region, Region],
     now: float,
     size: tuple[int, int],
-    *,
-    lasts_s: float,
-    outline_age_s: float,
+    ages_s: tuple[float, float],
     camera: CameraMotion | None = None,
 ) -> RelativeTrack | None:
     """Update the relative track of two bodies with an observation of both.
@@ -224,14 +222,13 @@ def update_relative_track(
         regions: Regions of the first and the second body; twice the same one when merged.
         now: Time of the observation, seconds.
         size: (width, height) of the image, pixels.
-        lasts_s: Length of the path, seconds.
-        outline_age_s: Age at which outlines are replaced, since bodies rotate, seconds.
+        ages_s: Length of the path, and age at which outlines are replaced, since bodies rotate; seconds.
         camera: Image motion of the static scene since the previous frame; None if unknown.
 
     Returns:
         The track with one more position; None when the two cannot be tracked.
     """
-    apart = regions[0] is not regions[1]
+    (lasts_s, outline_age_s), apart = ages_s, regions[0] is not regions[1]
     if track is None:
         return begin_relative_track(regions, now, size) if apart else None
     dt = now - track.path_end

@@ -192,9 +192,7 @@ def test_boxes_that_move_apart_are_followed(speed: float, known: bool) -> None:
     followed = begin_relative_track(both(0.0), 0.0, SIZE)
     for k in range(1, frames):
         now = k / 25
-        followed = update_relative_track(
-            followed, both(now), now, SIZE, lasts_s=1.2, outline_age_s=2.5
-        )
+        followed = update_relative_track(followed, both(now), now, SIZE, (1.2, 2.5))
     assert followed is not None
     assert followed.since == 0.0  # the outlines that were stored first are still found
     found = relative_velocity(followed, (frames - 1) / 25, 0.3)
@@ -214,7 +212,7 @@ def test_bodies_at_rest_before_a_zooming_camera_are_at_rest(rate: float, known: 
         for k in range(1, frames):
             regions = two_boxes(rate**k, rate, known)
             followed = update_relative_track(
-                followed, regions, k / 25, SIZE, lasts_s=1.2, outline_age_s=0.5, camera=given_camera
+                followed, regions, k / 25, SIZE, (1.2, 0.5), given_camera
             )
         assert followed is not None
         velocity = relative_velocity(followed, (frames - 1) / 25, 0.3)
