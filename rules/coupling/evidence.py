@@ -14,7 +14,6 @@ from visup.agent import (
     Column,
     Coupling,
     Mind,
-    Observation,
     Presence,
     Region,
     RelationTable,
@@ -143,12 +142,6 @@ def own_speed(mind: Mind, number: int) -> float | None:
     if body.last_seen == mind.time and body.region.velocity_sigma > 0.0:
         speeds.append(float(np.hypot(*body.region.velocity)))
     return min((s for s in speeds if s == s), default=None)  # NaN is not equal to itself
-
-
-def camera_motion(observation: Observation) -> Camera:
-    """The image motion of the static scene since the previous frame; None if it rests or is unknown."""
-    motions: Sequence[CameraMotion] = observation.of("camera")
-    return motions[-1] if motions and not np.array_equal(motions[-1].motion, np.eye(2, 3)) else None
 
 
 def observed_pairs(table: RelationTable, mind: Mind) -> list[PairObservation]:

@@ -45,7 +45,6 @@ from visup.rules.coupling.evidence import (
     CouplingEvidence,
     Pair,
     PairObservation,
-    camera_motion,
     common_speed,
     coupling_cells,
     feet_of,
@@ -67,6 +66,7 @@ from visup.rules.coupling.relative_motion import (
 from visup.rules.geometry.regions import image_diagonal
 from visup.rules.relations.kinematics import RelationSettings
 from visup.rules.relations.reasoner import kinematics, sample_window
+from visup.rules.relations.samples import camera_motion
 from visup.rules.wording.conditions import (
     Condition,
     DecisionLog,

@@ -257,7 +257,10 @@ def update_relative_track(
 def _moved_by_camera(
     first: OutlineTemplate, second: OutlineTemplate, camera: CameraMotion | None
 ) -> Vector:
-    """(x, y) by which the camera alone displaces the second of two outlines relative to the first, pixels."""
+    """(x, y) by which the camera alone displaces the second of two outlines relative to the first, pixels.
+
+    An approximation: the camera's motion in frames in which either was not seen is missing.
+    """
     if camera is None:
         return 0.0, 0.0
     (ax, ay), (bx, by) = (

@@ -128,6 +128,12 @@ def _camera_velocity(history: SampleWindow, now: float, drift: Floats) -> Floats
     return panning
 
 
+def camera_motion(observation: Observation) -> CameraMotion | None:
+    """The image motion of the static scene since the previous frame; None if it rests or is unknown."""
+    motions: Sequence[CameraMotion] = observation.of("camera")
+    return motions[-1] if motions and not np.array_equal(motions[-1].motion, np.eye(2, 3)) else None
+
+
 def drifted(before: Floats, objects: Sequence[ObjectBelief], observation: Observation) -> Floats:
     """Accumulate the image motion due to the camera at each object by one frame.
 
@@ -143,10 +149,10 @@ def drifted(before: Floats, objects: Sequence[ObjectBelief], observation: Observ
     Returns:
         (M, 2) pixels; the same array if the camera rests.
     """
-    motions: Sequence[CameraMotion] = observation.of("camera")
-    if not motions or np.array_equal(motions[-1].motion, np.eye(2, 3)):
+    camera = camera_motion(observation)
+    if camera is None:
         return before
-    moved = [motions[-1].displacement(b.region.centroid) for b in objects]
+    moved = [camera.displacement(b.region.centroid) for b in objects]
     drift: Floats = before + np.array(moved).reshape(-1, 2)
     return drift
 
