@@ -66,7 +66,7 @@ import visup.runs.runner
 from visup.compiled import cache_note
 print(cache_note())
 """
-"""All that a run loads; `.ci/run` has such a user watch the whole demo, which takes a minute of compiling."""
+"""All that a run loads; `.ci/run` has such a user replay a whole run."""
 
 
 def as_nobody(*command: str) -> list[str]:

@@ -106,11 +106,12 @@ def _write_report(
 def _print_verdict(console: Console, transcript: Transcript, *, has_task: bool) -> int:
     """Print how the replay ended; returns the exit code."""
     from visup.agent import Verdict
+    from visup.compiled import cache_note
     from visup.runs.result import RunResult
     from visup.terminal.narrator import verdict_line
 
     verdict = Verdict(transcript.verdict) if transcript.verdict else None
-    for text in transcript.at_end:
+    for text in filter(None, (cache_note(), *transcript.at_end)):
         console.print(text, soft_wrap=True, markup=False, style="yellow")
     console.print(verdict_line(verdict, has_task=has_task))
     return RunResult(verdict, transcript.steps, has_task=has_task).exit_code
