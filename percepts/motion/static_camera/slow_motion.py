@@ -26,6 +26,7 @@ from visup.percepts.motion.features.superpixels import Superpixels
 from visup.percepts.motion.features.work_image import Floats, WorkImage
 from visup.percepts.motion.outlines.region_outline import chosen, describe_mask, marked
 from visup.percepts.motion.static_camera._slow_motion_jit import (
+    closing,
     squared_difference,
     update_ground_belief,
 )
@@ -253,9 +254,8 @@ def _closed_mask(own: Mask, slow: Mask) -> Mask:
     both = own | slow
     x, y, w, h = cv2.boundingRect(both.view(np.uint8))
     part = np.s_[y : y + h, x : x + w]
-    closed = cv2.morphologyEx(np.pad(both[part].view(np.uint8), reach), cv2.MORPH_CLOSE, disc)
     out = np.zeros_like(both)
-    out[part] = closed[reach : reach + h, reach : reach + w] > 0
+    out[part] = closing(both[part], (disc[reach:].sum(axis=1) // 2).astype(np.uint8))
     return out
 
 

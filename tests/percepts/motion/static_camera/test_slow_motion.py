@@ -15,6 +15,7 @@ from visup.percepts.motion.features.superpixels import superpixels
 from visup.percepts.motion.features.work_image import WorkImage, prepare_image
 from visup.percepts.motion.outlines.region_outline import describe_mask
 from visup.percepts.motion.segmenter import MotionSegmenter
+from visup.percepts.motion.static_camera._slow_motion_jit import closing
 from visup.percepts.motion.static_camera.slow_motion import (
     LEAST_THICKNESS,
     NEVER_HIDDEN_S,
@@ -166,3 +167,20 @@ def test_what_moves_farther_than_a_part_is_thick_shows_itself(
         is_nearly_still(velocity, scale) or speed * scale * max(SPANS_S) > LEAST_THICKNESS * 0.999
     )
     assert is_nearly_still(velocity, scale / 2) or not is_nearly_still(velocity, scale)
+
+
+@settings(max_examples=20)
+@given(
+    reach=st.integers(0, 25),
+    share=st.floats(0, 1),
+    smooth=st.floats(0.5, 6),
+    seed=st.integers(0, 99),
+)
+def test_closing_is_that_of_opencv(reach: int, share: float, smooth: float, seed: int) -> None:
+    noise = np.random.default_rng(seed).random((60, 90), dtype=np.float32)
+    values = cv2.GaussianBlur(noise, (0, 0), smooth)
+    mask = np.ascontiguousarray(values >= np.quantile(values, share))
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
+    slow = cv2.morphologyEx(np.pad(mask.view(np.uint8), reach), cv2.MORPH_CLOSE, disc)
+    widths = (disc[reach:].sum(axis=1) // 2).astype(np.uint8)
+    assert np.array_equal(closing(mask, widths), slow[reach:, reach:][:60, :90] > 0)
