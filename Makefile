@@ -23,7 +23,7 @@ $(STAMP): pyproject.toml constraints.txt
 
 # What runs nothing (check, docs, wheel) need not wait for this.
 $(COMPILED): $(STAMP)
-	@echo 'Compiling the hot loops: once, for one to two minutes.'
+	@echo 'Compiling the hot loops: once, for two to three minutes.'
 	$(BIN)/python -m visup.serving.warm_up
 	touch $@
 

@@ -1,7 +1,7 @@
 """Warms up a process that has no job yet: loads the modules and the compiled loops.
 
 As a program (`python -m visup.serving.warm_up`) it compiles the loops, so that no run waits for that: the
-whole shipped clip is watched, and a part of it as a moving camera would see it.
+whole shipped clip is watched in few frames, and a part of it as a moving camera would see it.
 """
 
 from __future__ import annotations
@@ -22,19 +22,23 @@ from visup.runs.wiring import build_agent, open_video
 
 FRAMES = 12
 """Frames of the shipped clip, enough for something to move, be tracked and be recognised."""
+EVERY = 6  # frames of it from one to the next when all loops are to be compiled
 PAN_FRAMES, PAN_PX = 12, 4
 """Frames of it as seen by a camera that pans, and pixels between two of them."""
 
 
-def warm_up(stop: Callable[[], bool] = lambda: False, frames: int | None = FRAMES) -> None:
+def warm_up(
+    stop: Callable[[], bool] = lambda: False, frames: int | None = FRAMES, every: int = 2
+) -> None:
     """Process some frames of the shipped clip.
 
     Args:
         stop: Asked before each frame; True ends the warm-up.
         frames: How many; None for all.
+        every: Frames of the clip from one to the next.
     """
     with suppress(VisupError):
-        settings = demo_settings()
+        settings = demo_settings(every)
         agent = build_agent(settings)
         try:
             with open_video(settings) as video:
@@ -62,5 +66,5 @@ def has_job() -> bool:
 
 
 if __name__ == "__main__":
-    warm_up(frames=None)
+    warm_up(frames=None, every=EVERY)
     warm_up_moving_camera()
