@@ -48,9 +48,17 @@ def address(console: str) -> str:
     return console
 
 
-@pytest.fixture
-def browser(tmp_path: Path) -> Iterator[Browser]:
+@pytest.fixture(scope="package")
+def started_browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """One process for all tests: to start one takes as long as many of them, and its cache is empty."""
     found_browser()
-    with Browser(tmp_path / "profile", (1280, 860)) as browser:
+    with Browser(tmp_path_factory.mktemp("browser") / "profile", (1280, 860)) as browser:
         yield browser
-        assert browser.value("window.troubles || []") == []
+
+
+@pytest.fixture
+def browser(started_browser: Browser) -> Iterator[Browser]:
+    """A browser with a new page, signed in nowhere."""
+    started_browser.new_page()
+    yield started_browser
+    assert started_browser.value("window.troubles || []") == []

@@ -275,20 +275,14 @@ def test_all_panels_are_accessible(browser: Browser, address: str) -> None:
     assert accessibility_violations(browser) == []
 
 
-def test_pages_fit_a_phone(tmp_path: Path, address: str) -> None:
-    with Browser(tmp_path / "small", (390, 780)) as browser:
-        browser.call(
-            "Emulation.setDeviceMetricsOverride",
-            width=390,
-            height=780,
-            deviceScaleFactor=1,
-            mobile=True,
-        )
-        open_run(browser, address)
-        browser.until(
-            "document.fonts.status == 'loaded'"
-        )  # an icon without its font is a long word
-        browser.until("document.documentElement.scrollWidth <= 390")
-        browser.value("document.querySelector('a[href=\"/wall\"]').click()")
-        wait_for_text(browser, "picture of alert")
-        assert browser.value("document.documentElement.scrollWidth") <= 390
+def test_pages_fit_a_phone(browser: Browser, address: str) -> None:
+    browser.call(
+        "Emulation.setDeviceMetricsOverride", width=390, height=780, deviceScaleFactor=1, mobile=True
+    )
+    open_run(browser, address)
+    # An icon without its font is a long word.
+    browser.until("document.fonts.status == 'loaded'")
+    browser.until("document.documentElement.scrollWidth <= 390")
+    browser.value("document.querySelector('a[href=\"/wall\"]').click()")
+    wait_for_text(browser, "picture of alert")
+    assert browser.value("document.documentElement.scrollWidth") <= 390

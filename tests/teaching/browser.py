@@ -61,12 +61,8 @@ class Browser:
         os.close(down[0])
         os.close(up[1])
         self._write, self._read = down[1], up[0]
-        self._left, self._count, self._session = b"", 0, ""
-        target = self.call("Target.createTarget", url="about:blank")["targetId"]
-        attached = self.call("Target.attachToTarget", targetId=target, flatten=True)
-        self._session = attached["sessionId"]
-        self.call("Page.enable")
-        self.call("Runtime.enable")
+        self._left, self._count, self._session, self._target = b"", 0, "", ""
+        self.new_page()
 
     def __enter__(self) -> Self:
         return self
@@ -84,6 +80,21 @@ class Browser:
             self._process.kill()
             self._process.wait()
         os.close(self._read)
+
+    def new_page(self) -> None:
+        """Close the page and begin a new one, as another user would: without cookies and stored data.
+
+        What was loaded from a server stays in the cache, where the server allows it.
+        """
+        old, self._session = self._target, ""
+        self._target = self.call("Target.createTarget", url="about:blank")["targetId"]
+        if old:
+            self.call("Target.closeTarget", targetId=old)
+        attached = self.call("Target.attachToTarget", targetId=self._target, flatten=True)
+        self._session = attached["sessionId"]
+        self.call("Storage.clearDataForOrigin", origin="*", storageTypes="all")
+        self.call("Page.enable")
+        self.call("Runtime.enable")
 
     def call(self, method: str, **params: Any) -> dict[str, Any]:
         """Ask the browser for something, and wait for its answer."""
