@@ -119,7 +119,7 @@ def build_agent(
             bound that no task has, or to a model that the database lacks.
     """
     tasks, zones = _tasks_and_zones(settings)
-    database = ModelDatabase.open(settings.models) if settings.models else None
+    database = ModelDatabase.shared(settings.models) if settings.models else None
     _check_actors(settings, tasks, database)
     model_names, taught = _names(database)
     boxes = _detector(settings)

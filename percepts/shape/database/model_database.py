@@ -5,9 +5,11 @@ Read `search.py` for the search, `file_format.py` for the file and `database_bui
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
+from threading import Lock
 from typing import TypedDict, Unpack
 
 import numpy as np
@@ -78,6 +80,7 @@ class ModelDatabase:
         self._taught = tuple(taught)
         self._meshes = tuple(meshes)
         self._neighbours: dict[str, list[tuple[int, ...]]] = {}
+        self._searching = Lock()  # a search prepares views on first use
 
     @classmethod
     def open(cls, path: Path | str) -> ModelDatabase:
@@ -88,6 +91,20 @@ class ModelDatabase:
         """
         contents = read_contents(Path(path))
         return cls(Path(path), Views(contents), contents.taught, contents.meshes)
+
+    @classmethod
+    def shared(cls, path: Path) -> ModelDatabase:
+        """As `open`, but the same database as last time if its file is unchanged.
+
+        What a search prepares of the views takes more than a second, and then serves the next run too.
+        """
+        try:
+            found = path.stat()
+        except OSError:
+            return cls.open(path)
+        version = (found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns)
+        # A forked process may not use the file that its parent has open.
+        return _last_opened(path, (os.getpid(), *version))
 
     @classmethod
     def open_or_new(cls, path: Path | str) -> ModelDatabase:
@@ -261,13 +278,20 @@ class ModelDatabase:
         )
         first = options.get("try_first")
         always_included = np.intersect1d(self.views.named(first), among) if first else None
-        if not query.cut or query.border is None:
-            return self._search.rank_whole(query, among, limits, always_included)
-        cut_views = self.views.cut[among]
-        whole_matches = self._search.rank_whole(query, among[cut_views], limits, always_included)
-        cut_matches = self._search.rank_cut(query, among[~cut_views], limits)
+        with self._searching:
+            if not query.cut or query.border is None:
+                return self._search.rank_whole(query, among, limits, always_included)
+            is_cut = self.views.cut[among]
+            whole_matches = self._search.rank_whole(query, among[is_cut], limits, always_included)
+            cut_matches = self._search.rank_cut(query, among[~is_cut], limits)
         matches = limits.best([*whole_matches.matches, *cut_matches.matches])
         return Ranking(tuple(matches), whole_matches.compared + cut_matches.compared)
+
+
+@lru_cache(maxsize=1)
+def _last_opened(path: Path, version: tuple[int, ...]) -> ModelDatabase:
+    """A database, cached while its file has this version."""
+    return ModelDatabase.open(path)
 
 
 def candidate_count(views: int, budget: float = 0.1) -> int:

@@ -20,7 +20,7 @@ from visup.percepts.shape.building.database_builder import (
 )
 from visup.percepts.shape.database.file_format import APPLICATION_ID, VERSION
 from visup.percepts.shape.database.model_database import ModelDatabase
-from visup.percepts.shape.index.view_records import NODE, VIEW
+from visup.percepts.shape.index.view_records import NODE, VIEW, NewView
 from visup.percepts.shape.matching.shape_similarity import compare_shapes
 from visup.percepts.shape.shocks.shock_graph import ShockGraph
 
@@ -48,6 +48,18 @@ def test_written_views_are_read_back(stored: Path) -> None:
         assert compare_shapes(loaded, fresh).similarity > 0.999
         np.testing.assert_array_equal(loaded.graph.below, fresh.graph.below)
         np.testing.assert_allclose(loaded.contour, fresh.contour, atol=1e-3)
+
+
+def test_a_database_is_shared_until_its_file_changes(stored: Path, tmp_path: Path) -> None:
+    path = tmp_path / "zoo.models"
+    shutil.copy(stored, path)
+    database = ModelDatabase.shared(path)
+    assert ModelDatabase.shared(path) is database
+    database.add([NewView("disc", None, None, shape(np.pad(np.ones((20, 20), bool), 5)))])
+    assert "disc" in ModelDatabase.shared(path).names()
+    path.unlink()
+    with pytest.raises(DatabaseError, match="no such model database"):
+        ModelDatabase.shared(path)
 
 
 def test_equal_content_gives_equal_bytes(stored: Path, tmp_path: Path) -> None:
