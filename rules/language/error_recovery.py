@@ -144,9 +144,12 @@ def read_repaired(
     """
     text, repairs, syntax = block, list[Repair](), list[Diagnostic]()
     while True:
+        # Most texts have no error: they are parsed only once.
+        with suppress(UnexpectedInput):
+            found, diagnostics = _semantic(text, start, file, vocabulary)
+            return RepairedText(found, file, text, repairs, diagnostics, syntax)
         fault = _syntax_fault(text, start)
-        if fault is None:
-            break
+        assert fault is not None
         repair = None
         if len(repairs) < MOST_REPAIRS and budget.left >= 0:
             repair = find_repair(
@@ -161,8 +164,6 @@ def read_repaired(
             return RepairedText([], file, text, repairs, [], syntax)
         repairs.append(repair)
         text = repair.applied(text)
-    found, diagnostics = _semantic(text, start, file, vocabulary)
-    return RepairedText(found, file, text, repairs, diagnostics, syntax)
 
 
 def _semantic(
@@ -236,6 +237,8 @@ def with_tried_edits(
             sought for the others, which may follow from them.
     """
     diagnostics = list(faults)
+    if not diagnostics:
+        return diagnostics
     before = weigh(block)
     if before == OUT_OF_BUDGET:
         return diagnostics
