@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
+import shutil
 import sqlite3
 from collections.abc import Iterator
 from dataclasses import replace
@@ -78,6 +79,19 @@ def answered(tmp_path_factory: pytest.TempPathFactory) -> tuple[WatchSettings, P
     return settings, folder
 
 
+@pytest.fixture(scope="module")
+def broken(clip: WatchSettings, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a run that was interrupted at frame 27; only copied."""
+    folder = tmp_path_factory.mktemp("broken") / "run"
+    broken_run(clip, folder, 27, BARE)
+    return folder
+
+
+def copy_of(run: Path, folder: Path) -> Path:
+    """A run without what was still being written when it was interrupted."""
+    return shutil.copytree(run, folder, ignore=shutil.ignore_patterns("*.part"))
+
+
 def outcome(folder: Path) -> object:
     run = Recording.open(folder)
     facts = run.facts()
@@ -108,12 +122,14 @@ def test_a_kill_after_the_end_is_evaluated_like_any_other(
 
 @pytest.mark.parametrize("state", ["kept", "none", "damaged"])
 def test_a_resumed_run_has_the_same_outcome(
-    clip: WatchSettings, unbroken: Path, tmp_path: Path, state: str
+    clip: WatchSettings, unbroken: Path, broken: Path, tmp_path: Path, state: str
 ) -> None:
     parts = tmp_path / "parts"
-    every = 0.0 if state == "none" else 0.2
-    options = RunOptions(video=False, report=False, state_every_s=every)
-    broken_run(clip, parts, 27, options)
+    options = BARE if state != "none" else replace(BARE, state_every_s=0.0)
+    if state == "none":
+        broken_run(clip, parts, 27, options)
+    else:
+        copy_of(broken, parts)
     if state == "damaged":
         data = bytearray((parts / CHECKPOINT).read_bytes())
         data[len(data) // 2] ^= 1
@@ -130,11 +146,9 @@ def test_a_resumed_run_has_the_same_outcome(
 
 @pytest.mark.parametrize("part", ["agent", "kept", "behaviours"])
 def test_an_incompatible_checkpoint_is_reported_and_all_frames_perceived_again(
-    clip: WatchSettings, unbroken: Path, tmp_path: Path, part: str
+    unbroken: Path, broken: Path, tmp_path: Path, part: str
 ) -> None:
-    parts = tmp_path / "parts"
-    options = RunOptions(video=False, state_every_s=0.2)
-    broken_run(clip, parts, 27, options)
+    parts = copy_of(broken, tmp_path / "parts")
     past = interrupted_run(parts)
     assert past.state is not None
     earlier = {
@@ -143,31 +157,29 @@ def test_an_incompatible_checkpoint_is_reported_and_all_frames_perceived_again(
         "behaviours": replace(past.state, agent={**past.state.agent, "behaviours": {"eyes": {}}}),
     }
     past = replace(past, state=earlier[part])
-    result = supervise(past.settings, parts, options=options, past=past)
+    result = supervise(past.settings, parts, options=BARE, past=past)
     assert outcome(parts) == outcome(unbroken)
     (note,) = (n for n in result.notes if "perceived again" in n)
     assert f"another form than visup {__version__} has" in note
 
 
-def test_the_report_of_a_resumed_run_covers_the_whole_run(
-    clip: WatchSettings, tmp_path: Path
-) -> None:
+def test_the_report_of_a_resumed_run_covers_the_whole_run(broken: Path, tmp_path: Path) -> None:
     pytest.importorskip("plotly", reason="the extra visup[report] is not installed")
+    run = copy_of(broken, tmp_path / "run")
+    past = interrupted_run(run)
     options = RunOptions(video=False, state_every_s=0.2)
-    broken_run(clip, tmp_path / "run", 30, options)
-    past = interrupted_run(tmp_path / "run")
-    result = supervise(past.settings, tmp_path / "run", options=options, past=past)
+    result = supervise(past.settings, run, options=options, past=past)
     assert result.report is not None
     assert "40" in result.report.read_text()
     assert result.steps == 40
 
 
-def test_a_run_is_resumed_only_with_its_own_video(clip: WatchSettings, tmp_path: Path) -> None:
-    broken_run(clip, tmp_path / "run", 20, RunOptions(video=False, report=False, state_every_s=0))
-    past = interrupted_run(tmp_path / "run")
+def test_a_run_is_resumed_only_with_its_own_video(broken: Path, tmp_path: Path) -> None:
+    run = copy_of(broken, tmp_path / "run")
+    past = interrupted_run(run)
     other = write_clip(tmp_path / "short.avi", moving_disc(9))
     with pytest.raises(SourceError, match="not what was recorded"):
-        supervise(WatchSettings(source=str(other)), tmp_path / "run", options=BARE, past=past)
+        supervise(WatchSettings(source=str(other)), run, options=BARE, past=past)
 
 
 def test_an_answer_is_replayed(answered: tuple[WatchSettings, Path]) -> None:
@@ -208,13 +220,12 @@ def test_a_folder_without_a_run_cannot_be_resumed(tmp_path: Path) -> None:
 
 
 def test_a_replay_has_the_same_events_and_applies_other_rules(
-    clip: WatchSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    unbroken: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    supervise(clip, fresh_folder(tmp_path / "run", ""), options=BARE)
-    run = Recording.open(tmp_path / "run")
+    run = Recording.open(unbroken)
     again = replay(run, settings_for(run), fresh_folder(tmp_path / "again", ""))
     assert not transcript_diff(recorded_transcript(run), again)
-    events = [(tmp_path / n / "events.jsonl").read_bytes() for n in ("run", "again")]
+    events = [(f / "events.jsonl").read_bytes() for f in (unbroken, tmp_path / "again")]
     assert events[0] == events[1] != b""
     rules = tmp_path / "own.rules"
     rules.write_text(
