@@ -12,6 +12,7 @@ import pytest
 
 from tests.agent.scripted import Scripted, frames
 from visup.agent.cycle.agent import Agent
+from visup.agent.model.step import Step
 from visup.agent.storage.checkpoint import dump_state
 from visup.agent.storage.seal import KEY_FILE, own_key, seal
 from visup.runs import checkpoints
@@ -19,9 +20,15 @@ from visup.runs.checkpoints import CHECKPOINT, COMPRESSED, CheckpointWriter, rea
 from visup.version import __version__
 
 
+@pytest.fixture(scope="module")
+def two_hours() -> list[Step]:
+    """A step for each second."""
+    return list(Agent([Scripted("eye", ("x",))]).steps(frames(7200, fps=1.0)))
+
+
 @pytest.mark.parametrize("size", [100, 400, 3000])
 def test_checkpoints_keep_to_their_write_budget(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, size: int
+    two_hours: list[Step], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, size: int
 ) -> None:
     monkeypatch.setattr(checkpoints, "BYTES_PER_HOUR", 16_000.0)
     monkeypatch.setattr(checkpoints, "BURST_BYTES", 4_000.0)
@@ -29,7 +36,7 @@ def test_checkpoints_keep_to_their_write_budget(
     data = random.Random(1).randbytes(size)  # cannot be compressed
     monkeypatch.setattr(CheckpointWriter, "_serialised", lambda *_: data)
     written = []
-    for step in Agent([Scripted("eye", ("x",))]).steps(frames(7200, fps=1.0)):
+    for step in two_hours:
         writer.offer(None, step, dict)  # type: ignore[arg-type]
         if writer._writing is not None:
             writer._writing.result()  # a disk that is quick
