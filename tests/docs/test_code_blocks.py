@@ -13,13 +13,12 @@ from typing import Any
 
 import click
 import pytest
-import typer
 
 import visup
 from tests.clips import moving_disc, write_clip
 from tests.docs.blocks import Block, blocks, typed_lines
 from tests.paths import ROOT
-from visup.cli import app
+from visup.cli import command as visup_command
 from visup.rules.language.parser import parse_rules
 from visup.runs.demo import demo_settings
 from visup.tasks.grammar.parser import read
@@ -95,7 +94,7 @@ def _look_up(line: str, block: Block) -> None:
 
 
 def _look_up_visup(words: list[str], where: str) -> None:
-    command: Any = typer.main.get_command(app)
+    command: Any = visup_command()
     while isinstance(command, click.Group) or hasattr(command, "commands"):
         if not words or words[0].startswith("-"):
             break
