@@ -22,7 +22,7 @@ RULE = 'rule seen(a): warning\n    when in_view(a) > 0.2 s\n    say "{a} {is} se
 
 @pytest.fixture
 def settings(tmp_path: Path) -> WatchSettings:
-    clip = write_clip(tmp_path / "disc.avi", moving_disc(40), fps=20.0)
+    clip = write_clip(tmp_path / "disc.avi", moving_disc(20), fps=20.0)
     (tmp_path / "own.rules").write_text(RULE)
     return WatchSettings(source=str(clip), rules=(tmp_path / "own.rules",))
 
