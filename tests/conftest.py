@@ -21,6 +21,7 @@ import typer.testing
 from hypothesis import settings
 from hypothesis.internal.conjecture.providers import AVAILABLE_PROVIDERS, HypothesisProvider
 from hypothesis.internal.constants_ast import Constants
+from typer.main import get_command
 
 # As `visup` itself does, before NumPy is imported: threads of the linear algebra cost a fifth more than one.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -28,7 +29,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("VISUP_STATE_KEY", str(Path(tempfile.mkdtemp()) / "state.key"))
 
 # To put a command with its groups together takes typer a fifth of a second, in each call that a test makes.
-typer.testing._get_command = cache(typer.testing._get_command)
+typer.testing._get_command = cache(get_command)  # type: ignore[attr-defined]
 
 
 class SameProvider(HypothesisProvider):

@@ -281,7 +281,11 @@ def test_all_panels_are_accessible(browser: Browser, address: str) -> None:
 
 def test_pages_fit_a_phone(browser: Browser, address: str) -> None:
     browser.call(
-        "Emulation.setDeviceMetricsOverride", width=390, height=780, deviceScaleFactor=1, mobile=True
+        "Emulation.setDeviceMetricsOverride",
+        width=390,
+        height=780,
+        deviceScaleFactor=1,
+        mobile=True,
     )
     open_run(browser, address)
     # An icon without its font is a long word.
