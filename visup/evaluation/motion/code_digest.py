@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
+from functools import cache
 from importlib import resources
 from pathlib import Path
 
 from visup.evaluation.motion.runner import LabelledSequence
 
 
-def code_digest(folders: Sequence[str]) -> bytes:
-    """A digest of files and folders of the package, with their code and data."""
+@cache
+def code_digest(folders: tuple[str, ...]) -> bytes:
+    """A digest of files and folders of the package, with their code and data; made once per process."""
     digest = hashlib.sha256()
     package = Path(str(resources.files("visup")))
     for folder in folders:
