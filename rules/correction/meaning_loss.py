@@ -14,6 +14,7 @@ from visup.rules.correction.everyday_phrases import FILLERS
 COMMON_FIX_BONUS = 1.75
 """What a usual meaning may lose more than an edit of which nothing is known but that it is legal."""
 
+_DULL = FILLERS | {"and"}
 _CONTENT = re.compile(r"\d+(?:\.\d+)?|[^\W\d_]+|[|]")
 NUMBER_WEIGHT = 2
 """A number is seldom said in other words."""
@@ -56,8 +57,7 @@ def meaning_lost(before: str, after: str) -> float:
 def _content(text: str) -> Counter[str]:
     """The words and numbers of a text that mean something; comments count, too."""
     said = map(str.casefold, _CONTENT.findall(text))
-    dull = FILLERS | {"and"}
-    return Counter(w for w in said if w not in dull or w == "a")  # an object is often called a
+    return Counter(w for w in said if w not in _DULL or w == "a")  # an object is often called a
 
 
 def _weight(words: Counter[str]) -> float:

@@ -109,12 +109,13 @@ class _Search:
         self.heap: list[tuple[float, int, int, Stack, _Change | None, int]] = []
         self.costs: dict[tuple[int, Stack, int], list[float]] = {}
         self.meanings: dict[int, Sequence[Replacement]] = {}
+        self.drop_costs: dict[int, float] = {}
         self.acceptable: dict[Stack, list[tuple[float, tuple[str, ...], Stack]]] = {}
         self.order = count()
 
     def found(self) -> Iterator[_Change | None]:
         """The edits of each complete parse, linked from the last."""
-        self.push(0.0, 0, (self.edit_costs.automaton.initial,), None, 0)
+        self.push(0.0, 0, self.edit_costs.automaton.initial, None, 0)
         while self.heap and self.may_go_on():
             cost, behind, _, stack, change, put = heappop(self.heap)
             at = -behind
@@ -187,7 +188,9 @@ class _Search:
     def leave_out(self, cost: float, at: int, stack: Stack, change: _Change | None) -> None:
         """Drop the next word; earlier insertions commute with it."""
         if at < len(self.words):
-            price = self.edit_costs.drop_cost(self.words[at])
+            price = self.drop_costs.get(at)
+            if price is None:
+                price = self.drop_costs[at] = self.edit_costs.drop_cost(self.words[at])
             self.push(cost + price, at + 1, stack, _Change(at, 1, (), change), 0)
 
 

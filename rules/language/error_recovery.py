@@ -39,6 +39,8 @@ from visup.rules.predicates.vocabulary import RULES
 
 CHARACTERS_TRIED = 200_000
 """Characters parsed to find repairs of one file; errors beyond this budget get no hints."""
+TEXTS_KEPT = 512
+"""Texts whose errors are kept: many repairs lead to the same text, which is parsed again once it is chosen."""
 
 
 @dataclass
@@ -105,7 +107,7 @@ class RepairedText:
     file: str
     text: str
     repairs: list[Repair]
-    faults: list[Diagnostic]
+    faults: Sequence[Diagnostic]
     syntax: list[Diagnostic]
 
     def diagnostics(self, whole: str) -> list[Diagnostic]:
@@ -166,14 +168,15 @@ def read_repaired(
         text = repair.applied(text)
 
 
+@lru_cache(maxsize=TEXTS_KEPT)
 def _semantic(
     text: str, start: str, file: str, vocabulary: Vocabulary
-) -> tuple[Any, list[Diagnostic]]:
+) -> tuple[Any, Sequence[Diagnostic]]:
     """The tree of a text without syntax errors, and its semantic errors."""
     found, faults = read_tree(_parser().parse(text, start=start), file)
     checker = TypeChecker(text, file, vocabulary)
-    diagnostics = [checker.fault(*f) for f in faults]
-    return found, diagnostics or list(_checked(checker, found))
+    diagnostics = tuple(checker.fault(*f) for f in faults)
+    return found, diagnostics or tuple(_checked(checker, found))
 
 
 def _checked(checker: TypeChecker, found: Any) -> Iterator[Diagnostic]:
@@ -184,6 +187,7 @@ def _checked(checker: TypeChecker, found: Any) -> Iterator[Diagnostic]:
         yield from checker.formula(found)
 
 
+@lru_cache(maxsize=TEXTS_KEPT)
 def _syntax_fault(text: str, start: str) -> UnexpectedInput | None:
     reading = _parser().parse_interactive(text, start=start)
     state = reading.parser_state
@@ -191,7 +195,7 @@ def _syntax_fault(text: str, start: str) -> UnexpectedInput | None:
     try:
         reading.parser.parse_from_state(state)
     except UnexpectedInput as fault:
-        return fault
+        return fault.with_traceback(None)  # it would keep all of the parser alive
     return None
 
 
@@ -213,13 +217,13 @@ OUT_OF_BUDGET: Weight = (2, 0)
 SOUND: Weight = (0, 0)
 
 
-def weight(text: str, budget: RepairBudget) -> Weight:
+def weight(text: str, file: str, budget: RepairBudget) -> Weight:
     """Badness of a rule's text; the worst once the budget is spent."""
     budget.left -= len(text)
     if budget.left < 0:
         return OUT_OF_BUDGET
     try:
-        return 0, len(_semantic(text, "start", "", RULES)[1])
+        return 0, len(_semantic(text, "start", file, RULES)[1])
     except UnexpectedInput as fault:
         return 1, len(text) - place_of(text, fault)[0]
 

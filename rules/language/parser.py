@@ -57,7 +57,7 @@ def _parsed(text: str, file: str) -> tuple[Rule, ...]:
         found = read_repaired(block, "start", file, RULES, budget)
         diagnostics = found.diagnostics(text)
         errors += with_tried_edits(
-            block, diagnostics, partial(weight, budget=budget), len(found.syntax)
+            block, diagnostics, partial(weight, file=file, budget=budget), len(found.syntax)
         )
         rules += found.tree
     errors += TypeChecker(text, file).twice(rules)

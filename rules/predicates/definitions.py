@@ -62,7 +62,7 @@ class QuantityDefinition:
         return {**units, ANGLE: "deg", REAL_LENGTH: "m"}[self.dimension]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Vocabulary:
     """The names available in formulas.
 

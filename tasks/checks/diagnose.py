@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from collections.abc import Set as AnySet
-from functools import partial
+from functools import cache, partial
 
 from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.rules.language.fixes import pointing
@@ -45,6 +45,7 @@ def diagnose(
     if not faults:
         return task, faults
 
+    @cache  # several hints lead to the same text
     def check(changed: str) -> list[Diagnostic]:
         return _sorted_faults(changed, file, actions, percepts, read)[1]
 

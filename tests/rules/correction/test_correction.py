@@ -12,7 +12,7 @@ from lark import Lark
 from lark.exceptions import UnexpectedInput
 
 from visup.rules.correction import everyday_phrases, plain_sentences, repair_search
-from visup.rules.correction.automaton import END, LrAutomaton
+from visup.rules.correction.automaton import END, LrAutomaton, Stack
 from visup.rules.correction.local_edits import edits
 from visup.rules.correction.repair_search import EditCosts, Replacement, least_cost_repairs
 from visup.rules.correction.tokens import Word, terminals_of, tokens_of
@@ -71,7 +71,7 @@ def is_read(text: str) -> bool:
 
 @given(TEXTS)
 def test_the_automaton_takes_what_the_parser_takes(text: str) -> None:
-    stack: tuple[int, ...] | None = (AUTOMATON.initial,)
+    stack: Stack | None = AUTOMATON.initial
     for word in tokens_of(text, terminals_of(PARSER)):
         assert stack is not None
         stack = AUTOMATON.step(stack, word.terminals[0])

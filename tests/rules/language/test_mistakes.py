@@ -235,7 +235,7 @@ def test_what_more_slips_cost_is_bounded(monkeypatch: pytest.MonkeyPatch) -> Non
     spent = error_recovery.RepairBudget(left=-1)
     found = error_recovery.read_repaired(slip, "start", "r.rules", VOCABULARY, spent)
     told = found.diagnostics(slip)
-    weigh = partial(error_recovery.weight, budget=spent)
+    weigh = partial(error_recovery.weight, file="", budget=spent)
     assert told == error_recovery.with_tried_edits(slip, told, weigh)
     assert not looked
 
@@ -260,7 +260,7 @@ def test_once_nothing_may_be_tried_any_more_no_further_hint_is_looked_for(
     left = error_recovery.RepairBudget(left=4 * len(rule))
     assert (
         len(
-            error_recovery.with_tried_edits(rule, told, partial(error_recovery.weight, budget=left))
+            error_recovery.with_tried_edits(rule, told, partial(error_recovery.weight, file="", budget=left))
         )
         == 60
     )
