@@ -40,7 +40,7 @@ from visup.rules.predicates.vocabulary import RULES
 CHARACTERS_TRIED = 200_000
 """Characters parsed to find repairs of one file; errors beyond this budget get no hints."""
 TEXTS_KEPT = 512
-"""Texts whose errors are kept: many repairs lead to the same text, which is parsed again once it is chosen."""
+"""Texts whose errors are kept: many repairs lead to the same text, and the chosen one is parsed again."""
 
 
 @dataclass

@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Generic, TypeAlias, TypeVar
 
-from visup.agent.model.fast_replace import replace
 from visup.tasks.grammar.nodes import Course, StageCondition
 
 W = TypeVar("W")
@@ -150,7 +149,8 @@ def with_leaves(state: State[W], new: Iterator[Leaf[W]]) -> State[W]:
         case Leaf():
             return next(new)
         case SequenceState(head=head):
-            return replace(state, head=with_leaves(head, new))
+            new_head = with_leaves(head, new)
+            return state if new_head is head else SequenceState(new_head, state.rest)
         case ParallelState(parts=parts):
             return ParallelState(tuple(with_leaves(p, new) for p in parts))
 

@@ -9,6 +9,7 @@ Read before: `conditions.py` and `ast_courses.py`. Read next: `parser.py` (text 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Literal, TypeAlias
 
 from visup.rules.formula.nodes import Comparison
@@ -236,7 +237,7 @@ class Invariant:
         return f"{self.when} {self.condition}{lasting}{during}"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Task:
     """A task file.
 
@@ -294,8 +295,12 @@ class Task:
 
     def actor(self, name: str) -> Actor:
         """The declaration of an actor or bystander."""
-        declared = (*self.actors, *self.bystanders)
-        return next((a for a in declared if a.name == name), Actor(name))
+        return self._declared.get(name) or Actor(name)
+
+    @cached_property
+    def _declared(self) -> dict[str, Actor]:
+        """The first declaration of each name; asked for many times per step."""
+        return {a.name: a for a in reversed((*self.actors, *self.bystanders))}
 
     def models(self, actor: str) -> tuple[str, ...]:
         """Models that an actor may be: as declared, else the one of the actor's own name.

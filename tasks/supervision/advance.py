@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from visup.agent import Relation, StageBelief, Status, Truth
 from visup.agent.model.fast_replace import replace
 from visup.tasks.automaton.backpointers import Backpointer, behind, extended
 from visup.tasks.automaton.entries import held_on_entry, observed_entries
 from visup.tasks.automaton.states import Leaf, TaskStep, leaves, with_leaves
-from visup.tasks.supervision.hypotheses import Support, TaskHypothesis
+from visup.tasks.supervision.hypotheses import Successor, Support, TaskHypothesis
 from visup.tasks.supervision.open_transitions import (
     OpenTransition,
     earliest_end,
@@ -53,13 +54,14 @@ class Advance:
 
     def outcomes(
         self, hypothesis: TaskHypothesis, transitions: Sequence[OpenTransition]
-    ) -> Iterator[tuple[TaskHypothesis, float]]:
-        """A hypothesis and its successors by completing a step, with their probabilities.
+    ) -> Iterator[Successor]:
+        """A hypothesis and its successors by completing a step.
 
         Paused steps are not completed.
         """
+        node = hypothesis.node
         if all(self.observe(x.step).paused for x in leaves(hypothesis.state)):
-            yield hypothesis, 1.0
+            yield node, lambda: hypothesis, 1.0
             return
         present = [(t, self._is_paused(t)) for t in transitions if not self._awaits(t)]
         barred = tuple(t.entered for t, paused in present if paused)
@@ -71,8 +73,7 @@ class Advance:
         ways = len({t.entered for t in transitions if not t.ends})
         # A course that may end needs no further round of its last step.
         onward = [t for t in transitions if not t.ends and not (ends and t.again)]
-        found = ((t, self._support(hypothesis, t, ways)) for t in onward)
-        supported = [(t, support) for t, support in found if support]
+        supported = [(t, s) for t in onward if (s := self._support(hypothesis, t, ways))]
         due = 0.0  # share of another round, which waits until the last one has ceased
         if all(s <= Support.OVER for _, s in supported):
             due = sum(t.share for t in transitions if t.waits and self._all_over(t))
@@ -85,11 +86,13 @@ class Advance:
         for transition, chance in self._chances(hypothesis, supported, due, ends, forced):
             if chance > 0.0:
                 gone += chance
-                yield self._moved(hypothesis, transition), chance
+                target = transition.transition.target
+                yield target, partial(self._moved, hypothesis, transition), chance
         if not forced:
             considered = tuple((t.entered, support) for t, support in supported)
             considered += tuple(c for c in hypothesis.considered if c[0] in barred)
-            yield replace(hypothesis, considered=considered), max(0.0, 1.0 - gone)
+            stayed = replace(hypothesis, considered=considered)
+            yield node, lambda: stayed, max(0.0, 1.0 - gone)
 
     def _awaits(self, transition: OpenTransition) -> bool:
         """Whether a transition begins a round of a loop whose new actor is not present."""
@@ -176,8 +179,8 @@ class Advance:
     def _opens(self, hypothesis: TaskHypothesis, transition: OpenTransition) -> bool:
         """Whether the beginnings of all steps that a transition enters were observed."""
         met = dict(hypothesis.met).get(transition.entered, -math.inf)
-        passed = (self.observe(s).elapsed(s, met, self.now) for s in transition.entered)
-        return all(p <= self.steps.settings.contact_s for p in passed)
+        longest = self.steps.settings.contact_s
+        return all(self.observe(s).elapsed(s, met, self.now) <= longest for s in transition.entered)
 
     def _met(
         self, hypothesis: TaskHypothesis, transitions: Sequence[OpenTransition]
@@ -257,15 +260,14 @@ class Advance:
                 else x
                 for i, x in enumerate(under_way)
             ]
+        stages = {x.step.stage for x in under_way}
         return TaskHypothesis(
             with_leaves(state, iter(under_way)),
             transition.transition.target,
-            self._past(hypothesis, transition, {x.step.stage for x in under_way}),
+            self._past(hypothesis, transition, stages),
             backpointer=extended(hypothesis.backpointer, left, self.now, begun_at),
             gone_on=True,
-            lasting=""
-            if opened or unreached is not None
-            else self._lasting(transition, {x.step.stage for x in under_way}),
+            lasting="" if opened or unreached is not None else self._lasting(transition, stages),
         )
 
     def _lasting(self, transition: OpenTransition, under_way: Collection[str]) -> str:
@@ -350,20 +352,19 @@ class Advance:
 
     def _over_at(self, left: Leaf[StepMonitor]) -> float:
         """When a step ended; for one that lasts until the next begins, when it was last observed."""
-        by_itself = self.steps.over(left)
-        at = left.payload.fulfilled_at if by_itself else left.payload.helped_at
+        at = left.payload.fulfilled_at if self.steps.over(left) else left.payload.helped_at
         return self.now if at is None else at
 
     def _begun(
         self, leaf: Leaf[StepMonitor], opened: bool, unreached: float | None
     ) -> Leaf[StepMonitor]:
         """A step that begins now, with its first observation."""
+        seen = self.observe(leaf.step)
         if opened:
             leaf = replace(leaf, payload=replace(leaf.payload, opened=True))
         if unreached is not None:
-            late = missed(leaf.payload, self.observe(leaf.step), unreached, self.now)
-            leaf = replace(leaf, payload=late)
-        return self.steps.observed(leaf, self.observe(leaf.step), Moment(self.now, 0.0), False)
+            leaf = Leaf(leaf.step, missed(leaf.payload, seen, unreached, self.now))
+        return self.steps.observed(leaf, seen, Moment(self.now, 0.0), False)
 
     def _past(
         self, hypothesis: TaskHypothesis, transition: OpenTransition, under_way: set[str]
@@ -372,8 +373,7 @@ class Advance:
         found = {p.stage: p for p in hypothesis.past}
         followed = self._followed(transition)
         left = (self._ending(x, followed) for x in transition.left)
-        endings = sorted(left, key=lambda e: WORSE[e.status])
-        for ending in endings:
+        for ending in sorted(left, key=lambda e: WORSE[e.status]):
             failed = ending.status is Status.FAILED
             before = found.get(ending.stage)
             if before is not None and before.status is Status.FAILED:

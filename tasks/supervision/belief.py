@@ -30,7 +30,6 @@ from visup.tasks.supervision.hypotheses import (
     TaskHypothesis,
     likely,
     standings,
-    under_way,
 )
 from visup.tasks.supervision.monitored_phases import MonitoredPhases
 from visup.tasks.supervision.sentences import evidence, in_retrospect, outcome, paused_by
@@ -219,7 +218,7 @@ def _stage_belief(
     """The belief of one hypothesis about a stage that has begun in it."""
     now = snapshot.mind.time
     past = next((p for p in hypothesis.past if p.stage == stage), None)
-    leaf = under_way(hypothesis).get(stage)
+    leaf = hypothesis.under_way.get(stage)
     if leaf is None or (past is not None and past.status is Status.FAILED):
         assert past is not None
         done = past.status is Status.DONE and past.since < now
@@ -264,7 +263,7 @@ def _verdict(hypothesis: TaskHypothesis) -> Verdict:
         return Verdict.FAILED
     if hypothesis.finished is not None:
         return Verdict.SUCCEEDED
-    bad = any(x.payload.status in BAD for x in under_way(hypothesis).values())
+    bad = any(x.payload.status in BAD for x in hypothesis.under_way.values())
     return Verdict.IN_PROGRESS if hypothesis.begun or bad else Verdict.UNKNOWN
 
 
@@ -289,7 +288,7 @@ def _why(
 
 def _under_way(posterior: TaskHypotheses) -> dict[str, float]:
     """Stage -> probability that it is active, in the order of the most likely hypotheses."""
-    return posterior.marginals(lambda _, h: () if h.finished is not None else under_way(h))
+    return posterior.marginals(lambda _, h: () if h.finished is not None else h.under_way)
 
 
 def _current(posterior: TaskHypotheses) -> str:
@@ -298,7 +297,7 @@ def _current(posterior: TaskHypotheses) -> str:
     most = round(max(chances.values()), DIGITS)
     tied = {s for s, chance in chances.items() if round(chance, DIGITS) == most}
     hypotheses = (w.value for w in posterior.hypotheses.values())
-    steps = next(found for h in hypotheses if (found := under_way(h)).keys() & tied)
+    steps = next(found for h in hypotheses if (found := h.under_way).keys() & tied)
     here = {stage: leaf for stage, leaf in steps.items() if stage in tied}
     return min(here, key=lambda s: WORST_FIRST.index(here[s].payload.status))
 

@@ -7,9 +7,10 @@ stages. Its probability is kept by the task filter.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import cached_property
 
 from visup.agent import StageBelief, Status
 from visup.agent.model.fast_replace import replace
@@ -92,11 +93,24 @@ class TaskHypothesis:
         """Whether anything of the task was observed under it."""
         return self.gone_on or any(x.payload.begun is not None for x in leaves(self.state))
 
+    @cached_property
+    def under_way(self) -> Mapping[str, Leaf[StepMonitor]]:
+        """Active stage -> its step with the worst status, in the order of the text.
+
+        A failure before a stage has begun is attributed to the previous stage, if that lasts until then. So
+        is the end of a grasp before the next stage has begun: a grasp that takes nothing along was not a
+        grasp.
+        """
+        return _under_way(self)
+
     @property
     def failed(self) -> bool:
         """Whether a completed stage has failed."""
         return any(p.status is Status.FAILED for p in self.past)
 
+
+Successor = tuple[int, Callable[[], TaskHypothesis], float]
+"""The node of a successor, what makes it, and its probability: of several to one node, one is made."""
 
 NEAR = 0.01
 """Hypotheses at least this likely, relative to the best, contribute to what is expected."""
@@ -105,12 +119,7 @@ TaskHypotheses = TaskPosterior[int, TaskHypothesis]
 """The hypotheses about a task by the number of their state, with their probabilities."""
 
 
-def under_way(hypothesis: TaskHypothesis) -> dict[str, Leaf[StepMonitor]]:
-    """Active stage -> its step with the worst status, in the order of the text.
-
-    A failure before a stage has begun is attributed to the previous stage, if that lasts until then. So is
-    the end of a grasp before the next stage has begun: a grasp that takes nothing along was not a grasp.
-    """
+def _under_way(hypothesis: TaskHypothesis) -> dict[str, Leaf[StepMonitor]]:
     found: dict[str, Leaf[StepMonitor]] = {}
     for leaf in leaves(hypothesis.state):
         other = found.get(leaf.step.stage)
@@ -185,7 +194,7 @@ def _worse(leaf: Leaf[StepMonitor], other: Leaf[StepMonitor]) -> bool:
 def standings(hypothesis: TaskHypothesis) -> Mapping[str, Standing]:
     """The status of each stage in a hypothesis, without those that are pending."""
     found: dict[str, Standing] = {p.stage: (Progress.BEHIND, p.status) for p in hypothesis.past}
-    for stage, leaf in under_way(hypothesis).items():
+    for stage, leaf in hypothesis.under_way.items():
         if found.get(stage) == (Progress.BEHIND, Status.FAILED):
             continue  # one of its steps has failed for good
         done = hypothesis.finished is not None

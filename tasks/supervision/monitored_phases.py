@@ -8,7 +8,7 @@ on evidence, not at a rate.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import islice
@@ -20,6 +20,7 @@ from visup.tasks.actions.rhythm import Rhythm
 from visup.tasks.actions.vocabulary import FactEvaluator
 from visup.tasks.automaton.automaton import END, Automaton
 from visup.tasks.automaton.backpointers import behind
+from visup.tasks.automaton.forward_recursion import merged
 from visup.tasks.automaton.out_of_turn import later_steps
 from visup.tasks.automaton.prognosis import Prognosis, begun_by
 from visup.tasks.automaton.stage_hmm import SUPERVISION_HMM, StageHmm
@@ -164,15 +165,23 @@ class MonitoredPhases:
     def extended(
         self, posterior: TaskHypotheses, evidence: Observe, now: float, dt: float
     ) -> Iterator[tuple[int, TaskHypothesis, float, float]]:
-        """See `TaskModel`."""
+        """See `TaskModel`; of the paths to one state only the best is followed."""
+        for node, best_path in merged(self._paths(posterior, evidence, now, dt)).items():
+            yield node, best_path.value(), best_path.mass, best_path.best
+
+    def _paths(
+        self, posterior: TaskHypotheses, evidence: Observe, now: float, dt: float
+    ) -> Iterator[tuple[int, Callable[[], TaskHypothesis], float, float]]:
+        """All paths to successors, as `extended` gives them; the hypotheses are not made yet."""
+        advance = Advance(self.steps, evidence, now, dt)
         seen = tuple(self._seen_anew(posterior, evidence, now))
         for weighted in posterior.hypotheses.values():
             hypothesis, fit = self._aged(weighted.value, evidence, now, dt)
             fit *= self._false_alarms(weighted.value, seen)
             mass, best = weighted.mass * fit, weighted.best * fit
             open_to = self._open.of(hypothesis.state, hypothesis.node, now)
-            for new, chance in Advance(self.steps, evidence, now, dt).outcomes(hypothesis, open_to):
-                yield new.node, new, mass * chance, best * chance
+            for node, made, chance in advance.outcomes(hypothesis, open_to):
+                yield node, made, mass * chance, best * chance
 
     def _seen_anew(
         self, posterior: TaskHypotheses, observe: Observe, now: float

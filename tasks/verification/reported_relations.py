@@ -43,10 +43,11 @@ def with_reported(
 
 def merged_reports(parts: Iterable[ReportedRelations]) -> ReportedRelations:
     """Several sets of reports merged, each relation once."""
-    found: ReportedRelations = ()
+    found: dict[tuple[tuple[str, ...], str], float] = {}
     for pair, relation, until in (t for part in parts for t in part):
-        found = with_reported(found, pair, relation, until)
-    return found
+        earlier = found.pop((pair, relation), until)  # the last one merged stands last
+        found[pair, relation] = max(until, earlier)
+    return tuple((pair, relation, until) for (pair, relation), until in found.items())
 
 
 def since_reported(

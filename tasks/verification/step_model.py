@@ -51,7 +51,7 @@ class StepModel:
         step = replace(leaf.step, deadlines=()) if done else leaf.step
         meaning = self.actions[step.action]
         monitor = update_monitor(leaf.payload, step, meaning, seen, moment, self.settings)
-        return replace(leaf, payload=monitor)
+        return leaf if monitor is leaf.payload else Leaf(leaf.step, monitor)
 
     def held_before(
         self, leaf: Leaf[StepMonitor], seen: ActionObservation, held_by: Relation, now: float

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import cache
 from math import inf
 
 import pytest
 
 from tests.paths import ROOT
 from tests.tasks.scripted import RelationSpan, Script, play, task_of
-from visup.agent import Verdict
+from visup.agent import Reasoner, Verdict
 from visup.tasks import parse_task
+from visup.tasks.grammar.nodes import Task
 from visup.tasks.grammar.structure import task_actors
 from visup.tasks.supervision.supervise import finish, task_reasoner
 
@@ -42,8 +44,14 @@ def traces() -> list[Trace]:
     return found
 
 
+@cache  # all traces of a page are of one task
+def supervised(text: str) -> tuple[Task, Reasoner]:
+    task = parse_task(text)
+    return task, task_reasoner([task])
+
+
 def played(trace: Trace) -> Verdict:
-    task = parse_task(trace.task)
+    task, supervisor = supervised(trace.task)
     rows = [LINE.fullmatch(line) for line in trace.lines.splitlines()]
     assert all(rows), trace
     said = [(float(m[1]), float(m[2] or inf), m[3], tuple(m[4].split(", "))) for m in rows if m]
@@ -65,7 +73,7 @@ def played(trace: Trace) -> Verdict:
         objects={number[n]: (0.0, leaves[n]) for n in number},
         identities={k: {next(iter(task.models(n)), n): 0.9} for n, k in number.items()},
     )
-    return finish(task_of(play(task_reasoner([task]), script, last + 14.0, fps=5.0)))
+    return finish(task_of(play(supervisor, script, last + 14.0, fps=5.0)))
 
 
 def test_there_are_twelve_real_tasks() -> None:

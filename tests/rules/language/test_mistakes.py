@@ -260,7 +260,9 @@ def test_once_nothing_may_be_tried_any_more_no_further_hint_is_looked_for(
     left = error_recovery.RepairBudget(left=4 * len(rule))
     assert (
         len(
-            error_recovery.with_tried_edits(rule, told, partial(error_recovery.weight, file="", budget=left))
+            error_recovery.with_tried_edits(
+                rule, told, partial(error_recovery.weight, file="", budget=left)
+            )
         )
         == 60
     )

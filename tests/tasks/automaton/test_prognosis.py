@@ -11,7 +11,6 @@ from visup.agent import TaskBelief, Verdict
 from visup.tasks import load_task, parse_task
 from visup.tasks.automaton.hidden_phases import hidden_filter
 from visup.tasks.automaton.stage_hmm import SUPERVISION_HMM, ActionStatus
-from visup.tasks.supervision.hypotheses import under_way
 from visup.tasks.supervision.sentences import prospects_text
 from visup.tasks.supervision.supervise import task_reasoner
 
@@ -50,7 +49,7 @@ def test_hypotheses_sum_to_one_and_reported_beliefs_are_marginals(
         assert masses == sorted(masses, reverse=True)
         task = mind.tasks[0]
         if task.verdict is Verdict.IN_PROGRESS:
-            masses_of_stage = [w.mass for w in weighted if task.current in under_way(w.value)]
+            masses_of_stage = [w.mass for w in weighted if task.current in w.value.under_way]
             assert task.confidence == pytest.approx(sum(masses_of_stage))
         elif task.verdict is Verdict.SUCCEEDED:
             done = [w.mass for w in weighted if w.value.finished is not None]

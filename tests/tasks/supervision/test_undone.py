@@ -21,7 +21,7 @@ from visup.agent import Coupling, Expectation, Mind, Observation, Outcome, Statu
 from visup.agent.model.fast_replace import replace
 from visup.tasks import parse_task
 from visup.tasks.automaton.states import Leaf, ParallelState, TaskStep
-from visup.tasks.supervision.hypotheses import TaskHypothesis, under_way
+from visup.tasks.supervision.hypotheses import TaskHypothesis
 from visup.tasks.supervision.monitored_phases import brought_along
 from visup.tasks.supervision.supervise import task_reasoner
 from visup.tasks.verification.step_monitor import entered
@@ -141,7 +141,7 @@ def test_a_joint_action_does_not_begin_with_one_actor_alone(
     waits = replace(monitor, status=Status.ACTIVE)
     parts = Leaf(TaskStep("a", going, "lift"), goes), Leaf(TaskStep("b", waiting, "lift"), waits)
     hypothesis = TaskHypothesis(ParallelState(parts if first else parts[::-1]), 0)
-    status = under_way(hypothesis)["lift"].payload.status
+    status = hypothesis.under_way["lift"].payload.status
     assert status is (Status.PROGRESSING if begun else Status.ACTIVE)
 
 
