@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import ceil, floor, inf
 
+from visup.tasks.analysis.judging import JudgedRun
 from visup.tasks.grammar.nodes import Actor
 from visup.tasks.learning.meetings import MEETINGS
 from visup.tasks.learning.order import (
@@ -80,6 +81,7 @@ class Draft:
         places: Final places of the actors in contact.
         final_rest: The actor that comes to rest in the last stage.
         release: The release with which it ends.
+        judged_runs: (its text, id of a run) -> what that text makes of the run.
     """
 
     name: str
@@ -97,6 +99,7 @@ class Draft:
     places: tuple[FinalPlace, ...] = ()
     final_rest: FinalRest | None = None
     release: Release | None = None
+    judged_runs: dict[tuple[str, int], JudgedRun] = field(default_factory=dict)
 
     def text(self) -> str:
         """The task file."""

@@ -139,8 +139,7 @@ def _event_sequences(runs: Sequence[RunTrace]) -> list[list[CourseEvent]]:
 def _relaxed_until_valid(draft: Draft, dropped: list[str]) -> dict[str, Verdict]:
     """Relax the draft until it accepts all good runs, as far as possible; returns their verdicts."""
     while True:
-        task = parse_task(draft.text())
-        judged_runs = {r.name: judged(task, r.minds) for r in draft.runs if r.minds}
+        judged_runs = {r.name: _judged(draft, r) for r in draft.runs if r.minds}
         refused = [j for j in judged_runs.values() if j.verdict is not Verdict.SUCCEEDED]
         failing = _failing_stage(draft, refused[0]) if refused else None
         if refused and draft.release is not None and failing in (None, final_of(draft.plan)):
@@ -200,8 +199,7 @@ def _add_final_places(draft: Draft, results: Mapping[str, Verdict]) -> None:
 def _last_spans(draft: Draft) -> list[Span]:
     """From the end of the last stage but one to that of the last, in each run; empty if some run has none."""
     names = list(stage_names(draft.plan).values())[-2:]
-    task = parse_task(draft.text())
-    spans = [judged(task, r.minds).spans() for r in draft.runs if r.minds]
+    spans = [_judged(draft, r).spans() for r in draft.runs if r.minds]
     if (
         len(names) < 2
         or len(spans) < len(draft.runs)
@@ -224,7 +222,15 @@ def _failing_stage(draft: Draft, run: JudgedRun) -> Occurrence | None:
 
 
 def _verdict(draft: Draft, run: RunTrace) -> Verdict:
-    return judged(parse_task(draft.text()), run.minds).verdict
+    return _judged(draft, run).verdict
+
+
+def _judged(draft: Draft, run: RunTrace) -> JudgedRun:
+    """What the draft makes of a run; it is often asked again when nothing was added to the draft."""
+    key = draft.text(), id(run)
+    if key not in draft.judged_runs:
+        draft.judged_runs[key] = judged(parse_task(key[0]), run.minds)
+    return draft.judged_runs[key]
 
 
 def _forbid_events_of(draft: Draft, run: RunTrace) -> None:

@@ -166,10 +166,10 @@ class MonitoredPhases:
         self, posterior: TaskHypotheses, evidence: Observe, now: float, dt: float
     ) -> Iterator[tuple[int, TaskHypothesis, float, float]]:
         """See `TaskModel`; of the paths to one state only the best is followed."""
-        for node, best_path in merged(self._paths(posterior, evidence, now, dt)).items():
+        for node, best_path in merged(self.paths(posterior, evidence, now, dt)).items():
             yield node, best_path.value(), best_path.mass, best_path.best
 
-    def _paths(
+    def paths(
         self, posterior: TaskHypotheses, evidence: Observe, now: float, dt: float
     ) -> Iterator[tuple[int, Callable[[], TaskHypothesis], float, float]]:
         """All paths to successors, as `extended` gives them; the hypotheses are not made yet."""

@@ -41,8 +41,8 @@ class Unmerged:
         self, posterior: TaskHypotheses, evidence: Observe, now: float, dt: float
     ) -> Iterator[tuple[int, TaskHypothesis, float, float]]:
         """See `TaskModel`."""
-        for _, hypothesis, mass, best in self._model.extended(posterior, evidence, now, dt):
-            yield next(self._numbers), hypothesis, mass, best
+        for _, made, mass, best in self._model.paths(posterior, evidence, now, dt):
+            yield next(self._numbers), made(), mass, best
 
     def stage_statuses(
         self, key: int, hypothesis: TaskHypothesis
