@@ -95,5 +95,5 @@ def _row_distances(mask: Mask) -> NDArray[np.uint8]:
         near = 255
         for x in range(width - 1, -1, -1):
             near = 0 if mask[y, x] else min(near + 1, 255)
-            out[y, x] = min(np.int64(out[y, x]), near)
+            out[y, x] = min(int(out[y, x]), near)
     return out
