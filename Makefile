@@ -21,7 +21,7 @@ $(STAMP): pyproject.toml constraints.txt
 	  --config-settings editable_mode=compat -e '.[dev]'
 	touch $@
 
-# What runs nothing (check, docs, wheel) need not wait for this.
+# What runs nothing (check, docs) need not wait for this.
 $(COMPILED): $(STAMP)
 	@echo 'Compiling the hot loops: once, for two to three minutes.'
 	$(BIN)/python -m visup.serving.warm_up
@@ -61,7 +61,7 @@ docs: $(STAMP)
 	@echo 'Documentation: site/index.html'
 
 # Built from the sdist, it works in a clean environment, and for a user who may write nowhere.
-wheel: $(STAMP)
+wheel:
 	.ci/wheel
 
 clean:

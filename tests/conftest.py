@@ -25,6 +25,9 @@ from typer.main import get_command
 
 # As `visup` itself does, before NumPy is imported: threads of the linear algebra cost a fifth more than one.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# As `visup` does in processes that share the cores, here with the other worker: OpenCV takes one thread, too.
+if "PYTEST_XDIST_WORKER" in os.environ:
+    os.environ.setdefault("OPENCV_FOR_THREADS_NUM", "1")
 # States of runs are sealed with a key of the user; tests make their own, and leave his alone.
 os.environ.setdefault("VISUP_STATE_KEY", str(Path(tempfile.mkdtemp()) / "state.key"))
 

@@ -39,8 +39,9 @@ supervise(demo_settings(int(sys.argv[3])), folder, audience=Audience([stop]), op
 
 def told(folder: Path, cores: list[int]) -> tuple[bytes, list[bytes], list[object]]:
     """The events, all that was perceived, and what was believed of it."""
-    env = {**os.environ}
-    env.pop("OPENBLAS_NUM_THREADS", None)  # as many threads as there are cores
+    # As many threads as there are cores.
+    one_thread = ("OPENBLAS_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
+    env = {k: v for k, v in os.environ.items() if k not in one_thread}
     subprocess.run(
         [
             *(sys.executable, "-c", RUN, str(folder)),
