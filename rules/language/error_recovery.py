@@ -39,8 +39,7 @@ from visup.rules.predicates.vocabulary import RULES
 
 CHARACTERS_TRIED = 200_000
 """Characters parsed to find repairs of one file; errors beyond this budget get no hints."""
-TEXTS_KEPT = 512
-"""Texts whose errors are kept: many repairs lead to the same text, and the chosen one is parsed again."""
+TEXTS_KEPT = 8  # last texts whose trees are kept: the chosen repair of a text is parsed again
 
 
 @dataclass
@@ -187,7 +186,6 @@ def _checked(checker: TypeChecker, found: Any) -> Iterator[Diagnostic]:
         yield from checker.formula(found)
 
 
-@lru_cache(maxsize=TEXTS_KEPT)
 def _syntax_fault(text: str, start: str) -> UnexpectedInput | None:
     reading = _parser().parse_interactive(text, start=start)
     state = reading.parser_state
@@ -195,7 +193,7 @@ def _syntax_fault(text: str, start: str) -> UnexpectedInput | None:
     try:
         reading.parser.parse_from_state(state)
     except UnexpectedInput as fault:
-        return fault.with_traceback(None)  # it would keep all of the parser alive
+        return fault
     return None
 
 

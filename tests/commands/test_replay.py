@@ -47,6 +47,14 @@ def test_a_replay_gives_the_narrative_without_the_video(visup: Call, run: Path) 
     assert "Verdict" in result.out
 
 
+def test_a_replay_says_that_loops_cannot_be_kept(
+    visup: Call, run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert "compiled anew" not in visup("replay", run).out
+    monkeypatch.setattr("visup.compiled._uncached", ["fit"])
+    assert visup("replay", run).out.count("compiled anew") == 1
+
+
 def test_the_exit_code_says_whether_anything_changes(visup: Call, run: Path) -> None:
     same = visup("replay", run, "--diff")
     assert (same.code, same.out.splitlines()[-1]) == (0, "Nothing changes.")

@@ -163,23 +163,25 @@ def test_an_incompatible_checkpoint_is_reported_and_all_frames_perceived_again(
     assert f"another form than visup {__version__} has" in note
 
 
-def test_the_report_of_a_resumed_run_covers_the_whole_run(broken: Path, tmp_path: Path) -> None:
+def test_the_report_of_a_resumed_run_covers_the_whole_run(
+    clip: WatchSettings, tmp_path: Path
+) -> None:
     pytest.importorskip("plotly", reason="the extra visup[report] is not installed")
-    run = copy_of(broken, tmp_path / "run")
-    past = interrupted_run(run)
     options = RunOptions(video=False, state_every_s=0.2)
-    result = supervise(past.settings, run, options=options, past=past)
+    broken_run(clip, tmp_path / "run", 30, options)
+    past = interrupted_run(tmp_path / "run")
+    result = supervise(past.settings, tmp_path / "run", options=options, past=past)
     assert result.report is not None
     assert "40" in result.report.read_text()
     assert result.steps == 40
 
 
-def test_a_run_is_resumed_only_with_its_own_video(broken: Path, tmp_path: Path) -> None:
-    run = copy_of(broken, tmp_path / "run")
-    past = interrupted_run(run)
+def test_a_run_is_resumed_only_with_its_own_video(clip: WatchSettings, tmp_path: Path) -> None:
+    broken_run(clip, tmp_path / "run", 20, RunOptions(video=False, report=False, state_every_s=0))
+    past = interrupted_run(tmp_path / "run")
     other = write_clip(tmp_path / "short.avi", moving_disc(9))
     with pytest.raises(SourceError, match="not what was recorded"):
-        supervise(WatchSettings(source=str(other)), run, options=BARE, past=past)
+        supervise(WatchSettings(source=str(other)), tmp_path / "run", options=BARE, past=past)
 
 
 def test_an_answer_is_replayed(answered: tuple[WatchSettings, Path]) -> None:

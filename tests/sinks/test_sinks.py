@@ -304,8 +304,8 @@ def test_sinks_cost_the_cycle_little(tmp_path: Path) -> None:
 
 
 def test_a_short_soak_is_flat_and_repeats(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("visup.evaluation.runtime.soak.MIN_FRAMES", 120)
-    figures = evaluate_soak(200)
+    monkeypatch.setattr("visup.evaluation.runtime.soak.MIN_FRAMES", 200)
+    figures = evaluate_soak(300)
     assert figures["total"]["same"] == 1
     assert figures["total"]["rss_grown_mb"] < 20
     with pytest.raises(SettingsError):

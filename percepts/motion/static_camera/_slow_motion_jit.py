@@ -46,7 +46,7 @@ def update_ground_belief(
 
 @compiled
 def closing(mask: Mask, widths: NDArray[np.uint8]) -> Mask:
-    """Morphological closing of a mask by a symmetric, convex kernel of at most 253 pixels a side.
+    """Morphological closing of a mask by a symmetric, convex kernel of at most 509 pixels a side.
 
     Beyond the mask there is nothing. Each row of the kernel is compared with the distance to the nearest
     pixel in a row of the mask, which takes time in proportion to the height of the kernel, not to its area.

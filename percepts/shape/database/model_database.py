@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import cached_property, lru_cache
 from pathlib import Path
 from threading import Lock
-from typing import TypedDict, Unpack
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,6 +81,12 @@ class ModelDatabase:
         self._meshes = tuple(meshes)
         self._neighbours: dict[str, list[tuple[int, ...]]] = {}
         self._searching = Lock()  # a search prepares views on first use
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {k: v for k, v in vars(self).items() if k != "_searching"}
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        vars(self).update(state, _searching=Lock())
 
     @classmethod
     def open(cls, path: Path | str) -> ModelDatabase:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import shutil
 import sqlite3
@@ -60,6 +61,12 @@ def test_a_database_is_shared_until_its_file_changes(stored: Path, tmp_path: Pat
     path.unlink()
     with pytest.raises(DatabaseError, match="no such model database"):
         ModelDatabase.shared(path)
+
+
+def test_a_copy_finds_the_same(stored: Path) -> None:
+    database = ModelDatabase.open(stored)
+    query = shape(ZOO["walker"])
+    assert copy.deepcopy(database).query(query) == database.query(query)
 
 
 def test_equal_content_gives_equal_bytes(stored: Path, tmp_path: Path) -> None:

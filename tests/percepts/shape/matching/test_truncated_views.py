@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from tests.percepts.shape.shapes import ZOO, shape
+from visup.percepts.shape.matching import truncated_views
 from visup.percepts.shape.matching.truncated_views import (
     CutIndex,
     CutLine,
@@ -64,6 +65,25 @@ def test_only_given_sides_can_cut() -> None:
     assert nowhere is not None
     assert nowhere.border is None
     assert silhouette(box).border is None
+
+
+def test_a_search_that_is_stopped_leaves_nothing_half_prepared(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    seen = silhouette(truncated(ZOO["walker"], "left", 0.2), cut=True)
+    assert seen.border is not None
+    own, every = query_map(seen.contour, seen.border), np.arange(len(NAMES))
+    stopped = CutIndex([shape(ZOO[n]) for n in NAMES])
+
+    def stop(_: object) -> None:
+        raise TimeoutError
+
+    with monkeypatch.context() as during:
+        during.setattr(truncated_views, "_PaintedShape", stop)
+        with pytest.raises(TimeoutError):
+            stopped.likeliest(own, every, len(NAMES))
+    found, expected = (i.likeliest(own, every, len(NAMES)) for i in (stopped, index()))
+    assert found == expected
 
 
 @settings(max_examples=40, deadline=None)
