@@ -11,13 +11,17 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
 from visup.agent.model.errors import SettingsError
 from visup.evaluation.machines.clips import clip_folders, read_brief, read_truth
 from visup.render.worlds.kinds.catalogue import KINDS, random_world
 from visup.render.worlds.teaching_clip import teaching_world
-from visup.render.worlds.world import FPS, World
+from visup.render.worlds.viewpoint import first_in_view, fixed_camera, project, sees_all
+from visup.render.worlds.world import FPS, SIZE, World
 from visup.render.worlds.world_renderer import WorldRenderer
 from visup.render.worlds.writer import write_world
 from visup.tasks import load_tasks
@@ -127,6 +131,25 @@ def test_the_truth_of_every_outcome_is_consistent(kind: str, outcome: str, seed:
     actors = set(world.actors)
     assert {c for contact in truth.contacts for c in (contact.a, contact.b)} <= actors
     assert all(len(t.poses) in (1, *range(world.frames, 400)) for t in world.bodies)
+
+
+@pytest.mark.parametrize("seed", [12, 32, 42, 97000012, 97000032])
+def test_an_approach_begins_when_it_can_be_seen(seed: int) -> None:
+    world = random_world("inspect", seed)
+    approach, flight = world.truth.stages[:2]
+    craft = next(body for body in world.bodies if body.name == "inspector")
+    at = round(approach.from_s * FPS)
+    position = project(world.viewpoint, craft.poses[at, :3, 3], SIZE)
+    assert ((position > 0) & (position < np.array(SIZE))).all()
+    assert approach.from_s < flight.from_s
+
+
+@given(arrays(float, st.tuples(st.integers(1, 12), st.just(2)), elements=st.floats(-9, 9)))
+def test_the_first_frame_in_view_is_found(path: NDArray[np.float64]) -> None:
+    view = fixed_camera((0, -10, 0), (0, 0, 0), 40.0, len(path))
+    points = np.column_stack([path[:, 0], np.zeros(len(path)), path[:, 1]])
+    seen = [k for k, p in enumerate(points) if sees_all(view, [p], SIZE, margin=0.0)]
+    assert first_in_view(view, points, SIZE) == (seen[0] if seen else None)
 
 
 @pytest.mark.parametrize("kind", sorted(KINDS))

@@ -61,6 +61,13 @@ def sees_all(
     return bool(((position > margin) & (position < 1 - margin)).all())
 
 
+def first_in_view(view: Viewpoint, path: ArrayLike, size: tuple[int, int]) -> int | None:
+    """The first frame in which the camera at rest sees a moving point, (F, 3) metres; None if never."""
+    position = project(view, path, size)
+    inside = ((position > 0) & (position < np.array(size))).all(axis=1)
+    return int(np.argmax(inside)) if inside.any() else None
+
+
 def fixed_camera(
     position: ArrayLike, aim: ArrayLike, fov_vertical_deg: float, frames: int
 ) -> Viewpoint:

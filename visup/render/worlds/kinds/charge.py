@@ -33,7 +33,7 @@ from visup.render.worlds.motion import (
     quadratic_bezier,
     trapezoidal_profile,
 )
-from visup.render.worlds.viewpoint import project, sees_all
+from visup.render.worlds.viewpoint import first_in_view, sees_all
 from visup.render.worlds.world import (
     FPS,
     SIZE,
@@ -255,10 +255,8 @@ def _approach_path(layout: ChargeLayout, goal: Doubles) -> Doubles:
 
 def _in_view(view: Viewpoint, drive: VehiclePath, frames: int) -> float:
     """When the centre of the vehicle is first in view, seconds."""
-    points = np.column_stack([drive.at, np.full(len(drive.at), 0.2)])
-    xy = project(view, points, SIZE)
-    inside = ((xy > 0) & (xy < np.array(SIZE))).all(axis=1)
-    return float(np.argmax(inside)) / FPS if inside.any() else frames / FPS
+    first = first_in_view(view, np.column_stack([drive.at, np.full(len(drive.at), 0.2)]), SIZE)
+    return (frames if first is None else first) / FPS
 
 
 def _post_poses(layout: ChargeLayout, drive: VehiclePath, outcome: str) -> Poses:

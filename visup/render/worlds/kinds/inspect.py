@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +35,12 @@ from visup.render.worlds.motion import (
     make_poses,
     static_pose,
 )
-from visup.render.worlds.viewpoint import fixed_camera, project, with_camera_motion
+from visup.render.worlds.viewpoint import (
+    first_in_view,
+    fixed_camera,
+    project,
+    with_camera_motion,
+)
 from visup.render.worlds.world import (
     FPS,
     SIZE,
@@ -109,7 +114,8 @@ def build(rng: np.random.Generator, outcome: str) -> World:
         if crossing or free.min() > MIN_CLEAR_GAP_PX:
             break
         radius += 0.12
-    truth, limit = _truth(times, outcome, gaps, hit_s)
+    seen = (first_in_view(view, poses[:, :3, 3], SIZE) or 0) / FPS
+    truth, limit = _truth(replace(times, begin=max(times.begin, seen)), outcome, gaps, hit_s)
     if outcome == "in_progress":
         end = times.arrive + float(rng.uniform(1.5, 3.5))
         truth, frames = truncated(truth, end), frames_until(end)
@@ -279,9 +285,11 @@ def _truth(times: InspectTimes, outcome: str, gaps: Doubles, hit_s: float) -> tu
     t = frame_times(len(gaps))
     round_about = (t >= times.arrive) & (t <= times.leave)
     limit = int(np.ceil(gaps[round_about].max() * 1.12 / 10) * 10)
-    near = gaps < limit
-    begin = float(t[int(np.argmax(near))])
-    over = float(t[len(near) - 1 - int(np.argmax(near[::-1]))])
+    far = t[gaps >= limit]
+    # If it is within the range from the start, it has approached when it is on its circle.
+    approaching = far[far < times.arrive]
+    begin = max(times.begin, approaching[-1]) if len(approaching) else times.arrive
+    over = min(far[far > times.leave], default=times.end)
     moves = (Motion("inspector", times.begin, times.end),)
     approach = ("approach", times.begin, begin)
     if outcome == "touch":
