@@ -6,7 +6,7 @@ import os
 
 from visup.agent.model.errors import SettingsError
 
-LEAST_MEMORY_MB = 1200
+MIN_MEMORY_MB = 1200
 MEMORY_A_CORE_MB = 100
 """Address space of the loaded libraries: 1.2 GB measured with 2 cores; each core adds threads with stacks."""
 
@@ -23,7 +23,7 @@ def check_memory() -> None:
         limit, _ = resource.getrlimit(resource.RLIMIT_AS)
     except (ImportError, OSError):
         return
-    least = LEAST_MEMORY_MB + MEMORY_A_CORE_MB * (os.cpu_count() or 1)
+    least = MIN_MEMORY_MB + MEMORY_A_CORE_MB * (os.cpu_count() or 1)
     if limit != resource.RLIM_INFINITY and limit < least * 2**20:
         raise SettingsError(
             f"this process may use {limit >> 20} MB of memory, which visup cannot work with",

@@ -29,7 +29,7 @@ FOV_VERTICAL_DEG = 40.0
 NEAR_BEST = 0.08
 """Views less similar than the best by more than this are ignored for the size."""
 
-LEAST_RELATIVE_SIGMA = 0.03
+MIN_RELATIVE_SIGMA = 0.03
 """Least relative error: even a perfect match is limited by the set of views and the pixel grid."""
 
 
@@ -143,5 +143,5 @@ def _depth(region_id: int, name: str, found: Sequence[tuple[float, float]]) -> D
     near = [(s, d) for s, d in found if s >= best - NEAR_BEST]
     total = sum(s for s, _ in near)
     spread = math.sqrt(sum(s * (d - depth) ** 2 for s, d in near) / total) if total > 0 else 0.0
-    relative = LEAST_RELATIVE_SIGMA + 0.2 * (1 - best)
+    relative = MIN_RELATIVE_SIGMA + 0.2 * (1 - best)
     return Depth(region_id, name, depth, math.hypot(spread, relative * depth))

@@ -5,10 +5,10 @@ from __future__ import annotations
 import warnings
 from io import BytesIO
 
-MOST_PIXELS = 2**26
+MAX_PIXELS = 2**26
 """Most pixels of an image or frame, 67 million: twice an 8K frame. Beyond, decoding alone takes seconds and
 gigabytes."""
-_AT_MOST = f"visup decodes at most {MOST_PIXELS / 1e6:.0f} million"
+_AT_MOST = f"visup decodes at most {MAX_PIXELS / 1e6:.0f} million"
 
 
 def image_size(data: bytes) -> tuple[int, int] | None:
@@ -48,5 +48,5 @@ def check_pixels(width: float, height: float) -> None:
     Raises:
         ValueError: They are too many.
     """
-    if width * height > MOST_PIXELS:
+    if width * height > MAX_PIXELS:
         raise ValueError(f"has {width:.0f}x{height:.0f} pixels; {_AT_MOST}")

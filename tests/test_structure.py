@@ -14,12 +14,12 @@ import pytest
 from tests.paths import ROOT
 
 PARTS = ("agent", "percepts", "rules", "tasks", "visup")
-MOST_MODULES = 14
-MOST_LINES = 400
+MAX_MODULES = 14
+MAX_LINES = 400
 LONG_FUNCTION = 40
-MOST_LONG_FUNCTIONS = 10
+MAX_LONG_FUNCTIONS = 10
 MANY_PARAMETERS = 6
-MOST_WITH_MANY_PARAMETERS = 15
+MAX_WITH_MANY_PARAMETERS = 15
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 
@@ -69,12 +69,12 @@ def parameters(function: Function) -> int:
 def test_no_room_holds_more_modules_than_one_can_look_over() -> None:
     modules = [path for path in SOURCES if path.name != "__init__.py"]
     rooms = Counter(path.parent.relative_to(ROOT).as_posix() for path in modules)
-    assert {room: n for room, n in rooms.items() if n > MOST_MODULES} == {}
+    assert {room: n for room, n in rooms.items() if n > MAX_MODULES} == {}
 
 
 def test_no_file_is_too_long() -> None:
     lengths = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in SOURCES}
-    assert {p.relative_to(ROOT).as_posix(): n for p, n in lengths.items() if n > MOST_LINES} == {}
+    assert {p.relative_to(ROOT).as_posix(): n for p, n in lengths.items() if n > MAX_LINES} == {}
 
 
 def test_functions_are_small() -> None:
@@ -82,12 +82,12 @@ def test_functions_are_small() -> None:
     assert median(lengths) <= 7
     assert lengths[int(0.9 * len(lengths))] <= 18
     long = [f"{p.name}:{f.name}" for p, f in functions() if code_lines(f) > LONG_FUNCTION]
-    assert len(long) <= MOST_LONG_FUNCTIONS, long
+    assert len(long) <= MAX_LONG_FUNCTIONS, long
 
 
 def test_functions_take_few_parameters() -> None:
     many = [f"{p.name}:{f.name}" for p, f in functions() if parameters(f) > MANY_PARAMETERS]
-    assert len(many) <= MOST_WITH_MANY_PARAMETERS, many
+    assert len(many) <= MAX_WITH_MANY_PARAMETERS, many
 
 
 def test_no_class_name_stands_for_two_ideas() -> None:

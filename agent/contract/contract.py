@@ -15,7 +15,7 @@ CONTRACT_VERSION = 1
 COMPILING_HANG_S = 600.0
 """`hang_s` of behaviours that compile loops in their first runs, which takes minutes on a busy machine."""
 
-MOST_HISTORY = 64
+MAX_HISTORY = 64
 """Limit on `history`, since past frames are complete images held in memory."""
 
 
@@ -84,9 +84,7 @@ class Contract:
             value = getattr(self, field)
             valid = value is None or (_is_number_from(value, 0.0) and value > 0)
             self._expect(field, valid, "a number above 0, or None")
-        self._expect(
-            "history", _is_integer_in(self.history, 0, MOST_HISTORY), f"0 to {MOST_HISTORY}"
-        )
+        self._expect("history", _is_integer_in(self.history, 0, MAX_HISTORY), f"0 to {MAX_HISTORY}")
         self._expect("most_percepts", _is_integer_in(self.most_percepts, 1, 10**6), "1 to 1000000")
         for field in ("deterministic", "isolate"):
             self._expect(field, isinstance(getattr(self, field), bool), "True or False")

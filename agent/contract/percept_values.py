@@ -19,7 +19,7 @@ from visup.agent.model.records import CameraMotion, Depth, Health, HealthStatus,
 
 DEEPEST = 8
 """Values of plug-ins' own kinds may nest this deep."""
-MOST_BITS = 1024
+MAX_BITS = 1024
 """Longest integer, bits: longer ones could not be written and read back as JSON."""
 LARGEST_SIDE = 2**16
 """Largest width or height of a frame, pixels."""
@@ -144,9 +144,9 @@ def _check_plain(value: object, subject: str, depth: int = 0) -> None:
     expect(depth <= DEEPEST, f"{subject} nested too deep", f"at most {DEEPEST} levels")
     if isinstance(value, int) and not isinstance(value, Enum):
         expect(
-            value.bit_length() <= MOST_BITS,
+            value.bit_length() <= MAX_BITS,
             f"{subject} with a number of {value.bit_length()} bits",
-            f"at most {MOST_BITS}",
+            f"at most {MAX_BITS}",
         )
         return
     if value is None or isinstance(value, str | bytes | Enum | np.integer | np.bool_):

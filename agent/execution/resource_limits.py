@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-MOST_MORE_TASKS = 256
+MAX_MORE_TASKS = 256
 """Processes and threads beyond those of its user when it starts; linear algebra libraries use one per core.
 The system does not limit root."""
 
@@ -26,7 +26,7 @@ def limit_at_start(memory_mb: float) -> None:
         import resource
 
         _set(resource.RLIMIT_CORE, 0)
-        _set(resource.RLIMIT_NPROC, _tasks() + MOST_MORE_TASKS)
+        _set(resource.RLIMIT_NPROC, _tasks() + MAX_MORE_TASKS)
     except (ImportError, OSError, ValueError):
         return
     limit_memory(max(STARTING_MB, memory_mb), final=False)

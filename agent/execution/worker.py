@@ -48,7 +48,7 @@ EXCEPTIONS: Mapping[str, type[Exception]] = MappingProxyType(
 )
 """Exceptions that are reported by their names; all others become `BehaviourError`."""
 
-MOST_REPORTED_FAULTS = 100
+MAX_REPORTED_FAULTS = 100
 """Maximum number of reported faults of settings."""
 
 
@@ -165,7 +165,7 @@ def _failure(fault: BaseException) -> Message:
     if isinstance(fault, SystemExit | GeneratorExit | KeyboardInterrupt):
         return {"fault": ["", f"it called for an exit ({type(fault).__name__})"]}
     kind, text = type(fault).__name__, error_line(fault)
-    reported = [_error_document(f) for f in _single_faults(fault)[:MOST_REPORTED_FAULTS]]
+    reported = [_error_document(f) for f in _single_faults(fault)[:MAX_REPORTED_FAULTS]]
     if kind in EXCEPTIONS:
         return {"fault": [kind, text.removeprefix(f"{kind}: ")], "refused": reported}
     return {"fault": ["", text], "refused": reported}

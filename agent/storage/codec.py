@@ -41,12 +41,12 @@ LARGEST_STEP_BYTES = 256 * 2**20
 """Largest step, bytes uncompressed: a damaged file must not fill the memory."""
 LARGEST_REPORT_BYTES = 32 * 2**20
 """Reports larger than this are left out of a step that is too large."""
-MOST_BITS = 1024
+MAX_BITS = 1024
 """Longest integer, bits: longer ones could not be read back."""
 
 _COMPRESSION_LEVEL = 1  # zlib: higher levels save a few per cent and take several times as long
 _PLAIN = frozenset({type(None), bool, float, str})
-"""Types written unchanged; so are integers up to `MOST_BITS`."""
+"""Types written unchanged; so are integers up to `MAX_BITS`."""
 _NOT_ENCODED = (records.Frame, records.Observation, mind.Mind)
 _TYPES: Mapping[str, type] = MappingProxyType(
     {
@@ -255,7 +255,7 @@ def decode(value: Any) -> Any:
 
 
 def _integer(value: int) -> int:
-    if value.bit_length() > MOST_BITS:
+    if value.bit_length() > MAX_BITS:
         raise UnsupportedTypeError(f"a whole number of {value.bit_length()} bits")
     return value
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-MOST_PIXELS = 2**28
+MAX_PIXELS = 2**28
 """Maximum number of pixels and points of all masks and contours of a step together."""
 
 
@@ -25,7 +25,7 @@ _pixels_left: ContextVar[list[int]] = ContextVar("pixels that are left")
 @contextmanager
 def pixel_limit() -> Iterator[None]:
     """A context in which the total size of decoded masks and contours is limited."""
-    token = _pixels_left.set([MOST_PIXELS])
+    token = _pixels_left.set([MAX_PIXELS])
     try:
         yield
     finally:
@@ -34,10 +34,10 @@ def pixel_limit() -> Iterator[None]:
 
 def _reserve(pixels: int) -> None:
     """Account for memory before it is taken."""
-    remaining = _pixels_left.get([MOST_PIXELS])
+    remaining = _pixels_left.get([MAX_PIXELS])
     remaining[0] -= pixels
     if pixels < 0 or remaining[0] < 0:
-        raise ValueError(f"its masks have more than {MOST_PIXELS} pixels")
+        raise ValueError(f"its masks have more than {MAX_PIXELS} pixels")
 
 
 def mask_to_runs(mask: NDArray[np.bool_]) -> list[int]:

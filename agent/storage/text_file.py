@@ -50,12 +50,12 @@ def _read_at_most(file: IO[bytes], most: int) -> bytes:
     return b"".join(chunks)
 
 
-MOST_VALUES = 4_000_000
+MAX_VALUES = 4_000_000
 """Maximum number of values in a document: an empty list takes 2 bytes of text and thirty times that in
 memory."""
 
 
-def check_room(text: bytes, most: int = MOST_VALUES, marks: bytes = b",[{") -> None:
+def check_room(text: bytes, most: int = MAX_VALUES, marks: bytes = b",[{") -> None:
     """Refuse a document that would need far more memory than its text.
 
     Args:

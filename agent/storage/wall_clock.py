@@ -23,7 +23,7 @@ from visup.agent.model.step import Step
 TOLERANCE_S = 1.0
 """Tolerated difference of the clocks, seconds: records say when something happened, not how long it took."""
 
-MOST_ANCHORS = 10_000
+MAX_ANCHORS = 10_000
 LATEST = 253402300799.0
 """The end of the year 9999; later times are not valid."""
 
@@ -44,7 +44,7 @@ class WallClock:
         pairs = recorded if isinstance(recorded, list | tuple) else ()
         anchors = tuple(
             (float(pair[0]), float(pair[1]))
-            for pair in pairs[:MOST_ANCHORS]
+            for pair in pairs[:MAX_ANCHORS]
             if isinstance(pair, list | tuple) and len(pair) == 2 and all(map(_is_time, pair))
         )
         ascends = all(a[0] < b[0] for a, b in pairwise(anchors))
@@ -82,7 +82,7 @@ class WallClock:
         if known is not None and abs(known - wall_s) <= TOLERANCE_S:
             return self
         earlier = [a for a in self.anchors if a[0] < time_s]
-        return WallClock((*earlier, (time_s, wall_s))[-MOST_ANCHORS:])
+        return WallClock((*earlier, (time_s, wall_s))[-MAX_ANCHORS:])
 
 
 def _is_time(value: object) -> bool:

@@ -21,7 +21,7 @@ PAST_S = 0.4
 VELOCITY_SIGMA = 4.0
 """Standard deviation of a velocity, pixels per second: detectors' boxes jitter by a pixel or two."""
 
-LEAST_SIDE = 2
+MIN_SIDE = 2
 """Least width and height of the visible part of a box, pixels."""
 
 
@@ -84,7 +84,7 @@ class DetectorBehaviour:
         width, height = frame.size
         left, top = max(0, round(x)), max(0, round(y))
         right, bottom = min(width, round(x + w)), min(height, round(y + h))
-        if min(right - left, bottom - top) < LEAST_SIDE:
+        if min(right - left, bottom - top) < MIN_SIDE:
             return None
         corners = [(left, top), (right - 1, top), (right - 1, bottom - 1), (left, bottom - 1)]
         return Region(

@@ -19,14 +19,14 @@ HIGH_SCORE = 0.5
 START_SCORE = 0.35
 """Least score of a box that may start a track; below, it must recur several times to be reported."""
 
-LEAST_OVERLAP, LEAST_OVERLAP_LOW_SCORE = 0.15, 0.3
+MIN_OVERLAP, MIN_OVERLAP_LOW_SCORE = 0.15, 0.3
 """Least overlap of a box with a prediction to be associated. At 0.05 neighbours swap numbers; at 0.25 boxes
 that a poor detector misplaces start new tracks."""
 
 LOW_SCORE_FRAMES = 3
 """Frames without a box after which a track can no longer continue as a low-score box."""
 
-MOST_MISSED_FRAMES = 25
+MAX_MISSED_FRAMES = 25
 """Frames without a box after which a track is deleted."""
 
 PRIOR_LOG_ODDS, HIT_LOG_ODDS, MISS_LOG_ODDS, DELETION_LOG_ODDS = -2.0, 1.0, -1.0, -3.0
@@ -116,10 +116,10 @@ class MultiBoxTracker:
         owner: dict[int, _BoxTrack] = {}
         confirmed = {i for i in free if self._tracks[i].number}
         rounds = (
-            (high, confirmed, LEAST_OVERLAP),
-            (low, {i for i in confirmed if self._is_fresh(i, frame)}, LEAST_OVERLAP_LOW_SCORE),
-            (high, free - confirmed, LEAST_OVERLAP),
-            (low, free - confirmed, LEAST_OVERLAP_LOW_SCORE),
+            (high, confirmed, MIN_OVERLAP),
+            (low, {i for i in confirmed if self._is_fresh(i, frame)}, MIN_OVERLAP_LOW_SCORE),
+            (high, free - confirmed, MIN_OVERLAP),
+            (low, free - confirmed, MIN_OVERLAP_LOW_SCORE),
         )
         for boxes, candidates, least in rounds:
             rows, places = sorted(free & candidates), [p for p in boxes if p not in owner]
@@ -150,7 +150,7 @@ class MultiBoxTracker:
         return replace(d, track=track.number)
 
     def _delete_stale(self, frame: int) -> None:
-        self._tracks = [t for t in self._tracks if frame - t.frame <= MOST_MISSED_FRAMES + 1]
+        self._tracks = [t for t in self._tracks if frame - t.frame <= MAX_MISSED_FRAMES + 1]
 
 
 def _rows(state: BoxState) -> list[Any]:

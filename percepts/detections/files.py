@@ -16,10 +16,10 @@ EXPECTED = (
     "MOT lines `frame,id,left,top,width,height,score,...` (frames from 1), or COCO JSON whose "
     "annotations have `image_id` and `bbox` (and `track_id`, where a tracker has numbered them)"
 )
-MOST_BYTES = 2**27
-MOST_COCO_VALUES, MOST_MOT_LINES = 12_000_000, 2_000_000
+MAX_BYTES = 2**27
+MAX_COCO_VALUES, MAX_MOT_LINES = 12_000_000, 2_000_000
 """About one and two million boxes, which take a gigabyte."""
-FARTHEST, MOST_TRACKS = 1e6, 10**9
+FARTHEST, MAX_TRACKS = 1e6, 10**9
 """Pixels from the corner, and the highest number of a track."""
 SCORE = 6
 """Index of the last MOT column used, from 0."""
@@ -44,9 +44,9 @@ def read_detections(path: Path, images: Sequence[str] = ()) -> Frames:
             not have, or numbers only some of its boxes.
     """
     try:
-        text = read_text_file(path, MOST_BYTES)
+        text = read_text_file(path, MAX_BYTES)
         is_coco = text.lstrip().startswith("{")
-        check_room(text.encode(), *((MOST_COCO_VALUES,) if is_coco else (MOST_MOT_LINES, b"\n")))
+        check_room(text.encode(), *((MAX_COCO_VALUES,) if is_coco else (MAX_MOT_LINES, b"\n")))
         rows = _coco(json.loads(text), images) if is_coco else _mot(text)
         found: dict[int, list[Detection]] = {}
         for frame, detection in rows:
@@ -73,7 +73,7 @@ def _check(frame: int, detection: Detection) -> None:
         raise ValueError(f"there is no frame {frame}")
     if not all(abs(side) <= FARTHEST for side in detection.box):
         raise ValueError(f"a box at {detection.box}")
-    if detection.track > MOST_TRACKS:
+    if detection.track > MAX_TRACKS:
         raise ValueError("a track has a number of more than nine digits")
     if not min(detection.box[2:]) > 0:
         raise ValueError(f"a box of {detection.box[2]:g} x {detection.box[3]:g} pixels")

@@ -14,7 +14,7 @@ from visup.percepts.detections.boxes import Detection
 GREY = 114
 """Padding around the image: the grey that these networks were trained with."""
 
-LEAST_SCORE, MOST_OVERLAP = 0.25, 0.45
+MIN_SCORE, MAX_OVERLAP = 0.25, 0.45
 """Least score of a box, and most overlap of two boxes of a class (non-maximum suppression)."""
 
 CHOSEN_COLUMNS = 6
@@ -77,8 +77,8 @@ def decode_yolo(
     names: Sequence[str] = (),
     fitted: Letterbox = Letterbox(1.0, 0, 0),  # frozen
     *,
-    least_score: float = LEAST_SCORE,
-    most_overlap: float = MOST_OVERLAP,
+    least_score: float = MIN_SCORE,
+    most_overlap: float = MAX_OVERLAP,
 ) -> tuple[Detection, ...]:
     """Decode the boxes of one image from a network's output.
 

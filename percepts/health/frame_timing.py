@@ -10,7 +10,7 @@ import numpy as np
 from visup.percepts.health.repeated_frames import Repeat
 
 WINDOW_S = 1.0
-MOST_FRAMES = 128
+MAX_FRAMES = 128
 FEWEST_INTERVALS = 6  # fewest intervals to estimate the usual one
 
 
@@ -47,10 +47,10 @@ class ArrivalMonitor:
 
     def __init__(self, lost: float, gap: int, frozen_s: float) -> None:
         self._lost, self._gap, self._frozen_s = lost, gap, frozen_s
-        self._recent: deque[Arrival] = deque(maxlen=MOST_FRAMES)
-        self._steps: deque[int] = deque(maxlen=MOST_FRAMES)
-        self._waits: deque[float] = deque(maxlen=MOST_FRAMES)
-        self._repeats: deque[bool] = deque(maxlen=MOST_FRAMES)
+        self._recent: deque[Arrival] = deque(maxlen=MAX_FRAMES)
+        self._steps: deque[int] = deque(maxlen=MAX_FRAMES)
+        self._waits: deque[float] = deque(maxlen=MAX_FRAMES)
+        self._repeats: deque[bool] = deque(maxlen=MAX_FRAMES)
         self._run = 0
         self._run_s = 0.0
         self._last: tuple[int, float] | None = None

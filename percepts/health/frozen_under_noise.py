@@ -17,7 +17,7 @@ import numpy as np
 
 from visup.percepts.health.image_quality import ImageQuality
 from visup.percepts.health.quantiles import quantiles
-from visup.percepts.health.standstill import AFTER_S, FEWEST, HISTORY_S, MOST_FRAMES, per_cell
+from visup.percepts.health.standstill import AFTER_S, FEWEST, HISTORY_S, MAX_FRAMES, per_cell
 
 WHITE_RANGE = (0.8, 1.25)  # range of the median over the cells for white noise; ideally 1
 WHITE_LIMIT = 1.6  # the same exceeded by few of its cells
@@ -64,7 +64,7 @@ class NoiseOnlyDetector:
         self._last: ImageQuality | None = None
         self._first: ImageQuality | None = None  # of those that change by noise alone
         self._since = 0.0
-        self._before: deque[tuple[float, float]] = deque(maxlen=MOST_FRAMES)
+        self._before: deque[tuple[float, float]] = deque(maxlen=MAX_FRAMES)
 
     def reset(self) -> None:
         """Reset the history."""

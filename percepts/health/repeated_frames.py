@@ -19,18 +19,18 @@ from numpy.typing import NDArray
 from visup.percepts.health.quantiles import quantiles
 from visup.percepts.health.standstill import Floats, per_cell
 
-MOST_FRAMES = 25
+MAX_FRAMES = 25
 ENOUGH = 6
 DETECTABLE_PEAK = 1.5  # peak change from which near repeats can be detected, grey levels
 NEAR_REPEAT_SHARE = 0.1  # all cells of a near repeat change by less than this share of the usual
 RECODING_CHANGE = 1.0  # most change of a cell by recoding the same image, grey levels
 FLOOR = 0.3  # change that is not motion, beyond that of the whole image, grey levels
-FLOOR_MOST = 1.2  # bound of the latter: the whole image changes by more only when the camera moves
+MAX_FLOOR = 1.2  # bound of the latter: the whole image changes by more only when the camera moves
 # A mover that rested starts at less than 0.8 of its usual pace in 19 of 20 pauses of real and rendered clips;
 # after lost frames it exceeds that in three of four, since the lost step is made up for.
 RESUMED_STEPS = 0.8
 GAIN = 0.4  # share of the usual change per lost frame; below 1, since change saturates
-GAIN_MOST = 2.0
+MAX_GAIN = 2.0
 CALMEST_SHARE = 0.1  # share of the cells counted as the calmest
 NOISY_CHANGE = 0.01  # change of these from which there is always noise, grey levels
 
@@ -62,9 +62,9 @@ class RepeatDetector:
         self._repeated: Floats | None = None  # the repeated image
         self._run = 0
         self._exact = True
-        self._peaks: deque[float] = deque(maxlen=MOST_FRAMES)
-        self._motions: deque[float] = deque(maxlen=MOST_FRAMES)
-        self._calmest: deque[float] = deque(maxlen=MOST_FRAMES)
+        self._peaks: deque[float] = deque(maxlen=MAX_FRAMES)
+        self._motions: deque[float] = deque(maxlen=MAX_FRAMES)
+        self._calmest: deque[float] = deque(maxlen=MAX_FRAMES)
         self.was_lively = False
 
     def compare(self, image: NDArray[np.uint8], small: Floats) -> Repeat:
@@ -115,7 +115,7 @@ class RepeatDetector:
         if usual <= 0.0:
             return Repeat()
         steps = _motion(per_cell(cv2.absdiff(small, self._repeated))) / usual
-        catches_up = steps > min(1.0 + GAIN * self._run, GAIN_MOST)
+        catches_up = steps > min(1.0 + GAIN * self._run, MAX_GAIN)
         return Repeat(
             resumes=catches_up or (self._exact and steps > RESUMED_STEPS), catches_up=catches_up
         )
@@ -123,5 +123,5 @@ class RepeatDetector:
 
 def _motion(change: Floats) -> float:
     """Change summed over all moving parts: it grows with displacement, unlike that of a cell."""
-    floor = FLOOR + min(quantiles(change, 0.5)[0], FLOOR_MOST)
+    floor = FLOOR + min(quantiles(change, 0.5)[0], MAX_FLOOR)
     return float(np.maximum(change - floor, 0.0).sum())

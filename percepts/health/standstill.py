@@ -23,10 +23,10 @@ CELL = 10  # pixels of the small image along a cell
 LAG_S = 0.2  # time over which slow motion shows, seconds
 AFTER_S = 0.42  # how long the new state must have lasted, seconds
 HISTORY_S = 1.0
-MOST_FRAMES = 48  # most frames in the history, whatever the rate
+MAX_FRAMES = 48  # most frames in the history, whatever the rate
 FEWEST = 3  # fewest frames before the change
 STILL_CHANGE = 1.0  # most total difference of a still part beyond noise, grey levels
-LEAST_JUMP = 1.0  # least jump, grey levels; codec keyframes change a dark scene by less
+MIN_JUMP = 1.0  # least jump, grey levels; codec keyframes change a dark scene by less
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,7 +70,7 @@ class StandstillDetector:
 
     def __init__(self, covered: float) -> None:
         self._covered = covered
-        self._changes: deque[CellChange] = deque(maxlen=MOST_FRAMES)
+        self._changes: deque[CellChange] = deque(maxlen=MAX_FRAMES)
         self.standstill: Standstill | None = None
 
     def reset(self) -> None:
@@ -136,7 +136,7 @@ class StandstillDetector:
         stopped = was_moving & still_cells & (now.slow < 0.25 * least)
         then = before[-1].small
         # Light and codecs change bright parts more than dark ones.
-        least_jump = LEAST_JUMP + 0.1 * per_cell(then) + 3.0 * most
+        least_jump = MIN_JUMP + 0.1 * per_cell(then) + 3.0 * most
         jump = per_cell(cv2.absdiff(now.small, then)) > least_jump
         lost_texture = (texture > 3.0) & (now.texture < 0.3 * texture)
         moving = now.slow > np.maximum(still, 0.25 * least)

@@ -95,7 +95,7 @@ from visup.percepts.motion.tracks.warping import dense_likelihood, flow_back
 
 Numbered = TypeVar("Numbered", Track, Region)
 FlowCues = Future[tuple[FrameCues, CueMemory]]
-MOST_CAMERA_SHIFT = 0.02  # farthest the camera may move over a baseline, as a share of the image
+MAX_CAMERA_SHIFT = 0.02  # farthest the camera may move over a baseline, as a share of the image
 
 
 class MotionSegmenter:
@@ -331,7 +331,7 @@ class MotionSegmenter:
         They serve slow motion. When the camera has turned far, there is little to compare, which misleads;
         while it moves, single frames decide what is reported, and every other frame is enough.
         """
-        every, far = 2 if self._foreground.moves else 1, MOST_CAMERA_SHIFT * max(image.shape)
+        every, far = 2 if self._foreground.moves else 1, MAX_CAMERA_SHIFT * max(image.shape)
         wanted = () if self._count % every else self.settings.lags_s
         all_ = self._history.lags(wanted)
         lags = [lag for lag in all_ if lag > 1 and self._camera_shift(image, lag) < far]

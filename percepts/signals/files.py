@@ -13,7 +13,7 @@ from visup.agent.model.errors import SettingsError
 from visup.agent.storage.text_file import check_room, read_text_file
 from visup.percepts.signals.behaviour import NAME, Value
 
-MOST_BYTES, MOST_VALUES = 2**27, 6_000_000
+MAX_BYTES, MAX_VALUES = 2**27, 6_000_000
 TIME = "time"
 TRUTHS = {"true": True, "yes": True, "on": True, "false": False, "no": False, "off": False}
 EXPECTED = (
@@ -52,8 +52,8 @@ def read_signals(path: Path) -> SignalTable:
         SettingsError: The file cannot be read, or is not such a table; the message names the line.
     """
     try:
-        text = read_text_file(path, MOST_BYTES)
-        check_room(text.encode(), MOST_VALUES, b",\n")
+        text = read_text_file(path, MAX_BYTES)
+        check_room(text.encode(), MAX_VALUES, b",\n")
         rows = list(csv.reader((f"{line}\n" for line in text.split("\n")), strict=True))
     except OSError as fault:
         what = f"the signals cannot be read ({fault.strerror or fault})"

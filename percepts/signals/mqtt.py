@@ -11,7 +11,7 @@ from visup.agent.model.errors import ExtraMissingError, SettingsError
 from visup.percepts.signals.behaviour import NAME, Value
 
 PORT = 1883
-MOST_SIGNALS = 1000
+MAX_SIGNALS = 1000
 LONGEST_WORD = 200
 
 
@@ -62,7 +62,7 @@ class MqttSignals:
             return
         if value is None:
             self._known.pop(name, None)
-        elif name in self._known or len(self._known) < MOST_SIGNALS:
+        elif name in self._known or len(self._known) < MAX_SIGNALS:
             self._known[name] = value
 
 

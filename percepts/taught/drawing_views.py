@@ -14,7 +14,7 @@ TILE = 200
 """Side of a view, pixels."""
 
 _BELOW = 28
-_MOST_COLUMNS = 5
+_MAX_COLUMNS = 5
 _PAPER, _INK, _LINE = (255, 255, 255), (47, 39, 35), (60, 180, 255)
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 
@@ -28,7 +28,7 @@ def taught_views_sheet(views: Sequence[TaughtView]) -> NDArray[np.uint8]:
     Returns:
         (H, W, 3) uint8, BGR.
     """
-    columns = min(_MOST_COLUMNS, len(views))
+    columns = min(_MAX_COLUMNS, len(views))
     rows = -(-len(views) // columns)
     sheet = np.full((rows * (TILE + _BELOW), columns * TILE, 3), _PAPER, np.uint8)
     for k, view in enumerate(views):

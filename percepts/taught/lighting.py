@@ -20,10 +20,10 @@ from visup.percepts.taught.taught_view import TaughtView
 CELLS = (32, 24)
 """Cells of an image, across and down."""
 
-LEAST_CHANGE = 0.18
+MIN_CHANGE = 0.18
 """Least change of the light that matters, as a natural logarithm: by more than a step of the histograms."""
 
-MOST_CHANGE = 1.1
+MAX_CHANGE = 1.1
 """Greatest change that is one of light, to a third or threefold; a video that fades in begins in the dark."""
 
 
@@ -43,7 +43,7 @@ def relit_views(
         video_image = np.asarray(cv2.cvtColor(video_image, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
     for number, view in enumerate(views):
         gain = light_change(view.scene, video_image)
-        if LEAST_CHANGE <= np.abs(np.log(gain)).max() <= MOST_CHANGE:
+        if MIN_CHANGE <= np.abs(np.log(gain)).max() <= MAX_CHANGE:
             image, scene = (_in_light(part, gain) for part in (view.image, view.scene))
             yield number, replace(view, image=image, scene=scene)
 

@@ -24,7 +24,7 @@ STEPS = np.arange(1.0, 60.0, 0.5)
 LEAST, MOST = 0.0008, 0.15
 """Shares of the image that an object may cover: less is a speck, more is the ground."""
 
-LEAST_JUMP = math.log(1.5)
+MIN_JUMP = math.log(1.5)
 """Least logarithmic growth of area that counts as spilling over an edge."""
 
 _CLOSED = 7  # holes and slits narrower than this are closed, pixels of the reduced image
@@ -71,7 +71,7 @@ def _before_the_jump(lab: NDArray[np.float32], seed: tuple[int, int]) -> NDArray
     found = [_reached(lab, seed, float(step)) for step in STEPS]
     # Beyond the largest step the region would jump to the whole image.
     areas = [*(int(np.count_nonzero(m)) for m in found), whole]
-    best, most = None, LEAST_JUMP
+    best, most = None, MIN_JUMP
     for mask, (area, after) in zip(found, pairwise(areas), strict=True):
         if LEAST * whole <= area <= MOST * whole and math.log(after / area) > most:
             best, most = mask, math.log(after / area)

@@ -18,7 +18,7 @@ from visup.agent.model.errors import SettingsError
 SCENE_WIDTH = 480
 """Most width of the stored image, pixels."""
 
-LEAST_PIXELS = 24
+MIN_PIXELS = 24
 """Fewest pixels of an outline that can be recognised."""
 
 
@@ -85,10 +85,10 @@ def taught_view_from_mask(
         SettingsError: The mask has almost no pixels.
     """
     height, width = mask.shape
-    if np.count_nonzero(mask) < LEAST_PIXELS:
+    if np.count_nonzero(mask) < MIN_PIXELS:
         raise SettingsError(
             f"there is nothing in the outline of '{name}'",
-            expected=f"at least {LEAST_PIXELS} pixels within the picture of {width} x {height}",
+            expected=f"at least {MIN_PIXELS} pixels within the picture of {width} x {height}",
         )
     x, y, w, h = cv2.boundingRect(mask.astype(np.uint8))
     margin = max(w, h) // 2 + 1

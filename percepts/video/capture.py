@@ -15,7 +15,7 @@ from visup.percepts.video.source import DEFAULT_FPS, to_bgr
 
 CONNECT_MS = 10_000
 HIGHEST_FPS = 1000.0
-MOST_FRAMES = 10**8
+MAX_FRAMES = 10**8
 
 
 class Capture(Protocol):
@@ -85,4 +85,4 @@ def announced_frames(capture: Capture) -> int | None:
     import cv2
 
     count = float(capture.get(cv2.CAP_PROP_FRAME_COUNT))
-    return int(count) if math.isfinite(count) and 0 < count < MOST_FRAMES else None
+    return int(count) if math.isfinite(count) and 0 < count < MAX_FRAMES else None

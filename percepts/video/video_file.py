@@ -22,7 +22,7 @@ from visup.percepts.video.source import Ending, VideoSource
 
 SNIFFED_BYTES = 4096
 ROUNDING_S = 0.002
-LEAST_STEP = 0.1
+MIN_STEP = 0.1
 """Least time between two frames, in usual intervals: velocities between moments that are equal up to rounding
 would be unbounded."""
 STILL_IMAGE = "it is a single image, not a video"
@@ -62,7 +62,7 @@ class ContainerClock:
         even, time_s = index / self.fps, container_s - self._first
         if self.constant or abs(time_s - even) <= ROUNDING_S:
             time_s = even
-        least = self._last + LEAST_STEP / self.fps if index else self._last
+        least = self._last + MIN_STEP / self.fps if index else self._last
         if not (np.isfinite(time_s) and time_s > least):
             time_s = self._last + 1.0 / self.fps if index else 0.0
         self._last = time_s

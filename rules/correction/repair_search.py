@@ -17,10 +17,10 @@ from visup.rules.correction.automaton import END, LrAutomaton, Stack
 from visup.rules.correction.local_edits import Repair
 from visup.rules.correction.tokens import Terminals, Word, tokens_of
 
-MOST_INSERTIONS_IN_A_ROW = 4
+MAX_INSERTIONS_IN_A_ROW = 4
 SPELLINGS_TRIED = 8
 """Most spellings tried of one correction, where an inserted unit or name may be one of several."""
-MOST_EQUIVALENT = 8
+MAX_EQUIVALENT = 8
 """Most parses followed with the same continuation: a bracket may be missing in several places.
 """
 NEAR_TERMINAL_COST = 0.1
@@ -129,9 +129,9 @@ class _Search:
     def push(self, cost: float, at: int, stack: Stack, change: _Change | None, put: int) -> None:
         """Queue a configuration, unless enough equivalent ones at no higher cost are queued."""
         costs = self.costs.setdefault((at, stack, put), [])
-        if len(costs) < MOST_EQUIVALENT or cost < costs[-1]:
+        if len(costs) < MAX_EQUIVALENT or cost < costs[-1]:
             insort(costs, cost)
-            del costs[MOST_EQUIVALENT:]
+            del costs[MAX_EQUIVALENT:]
             heappush(self.heap, (cost, -at, next(self.order), stack, change, put))
 
     def read_on(self, cost: float, at: int, stack: Stack, change: _Change | None) -> None:
@@ -169,7 +169,7 @@ class _Search:
 
     def put_in(self, cost: float, at: int, stack: Stack, change: _Change | None, put: int) -> None:
         """Insert each word that may precede the next one."""
-        if put >= MOST_INSERTIONS_IN_A_ROW:
+        if put >= MAX_INSERTIONS_IN_A_ROW:
             return
         offered = self.acceptable.get(stack)
         if offered is None:

@@ -40,7 +40,7 @@ bending arm moves differently at its shoulder than at its hand."""
 NEIGHBOUR_MARGIN = 6.0
 """Distance to the other body within which an outline is not trusted, pixels."""
 
-LEAST_SIGMA = 0.3
+MIN_SIGMA = 0.3
 """Least standard deviation of an image velocity, pixels per second."""
 
 CORRELATION_S = 0.2
@@ -49,8 +49,8 @@ CORRELATION_S = 0.2
 PART_VARIANCE = 4.0
 """Factor of variance when the motion of a whole body replaces that of a part."""
 
-LEAST_POINTS = 12  # fewest points of an outline template
-LEAST_SAMPLES = 5  # fewest positions from which a velocity is measured
+MIN_POINTS = 12  # fewest points of an outline template
+MIN_SAMPLES = 5  # fewest positions from which a velocity is measured
 _OUTLIER = 1.5  # distance beyond which a point is down-weighted, pixels
 
 
@@ -124,13 +124,13 @@ def outline_template(
     for other in others:
         near = prepared_outline(other)
         free &= ~near_outline(points, near.points, near.boxes, NEIGHBOUR_MARGIN)
-    if free.sum() < LEAST_POINTS:
+    if free.sum() < MIN_POINTS:
         return None
     if beside is not None and region.area > beside.area:
         reach = max(NEAR_REACH * float(np.hypot(*beside.bbox[2:])), 0.05 * float(np.hypot(*size)))
         close = free & (_distance_to_box(points, beside.bbox) <= reach)
         # If too little remains, or hardly anything is excluded, the whole body is tracked.
-        if 2 * LEAST_POINTS <= close.sum() < 0.8 * free.sum():
+        if 2 * MIN_POINTS <= close.sum() < 0.8 * free.sum():
             return OutlineTemplate(points[close], normals[close], local=True)
     return OutlineTemplate(points[free], normals[free])
 
@@ -196,7 +196,7 @@ def register_outline(
 def _register_from(
     start: Vector, kept: OutlineTemplate, target: TargetOutline
 ) -> OutlineTemplate | None:
-    limits = ICP_REACH, max(float(LEAST_POINTS), 0.5 * len(kept.points)), _OUTLIER
+    limits = ICP_REACH, max(float(MIN_POINTS), 0.5 * len(kept.points)), _OUTLIER
     found, x, y = register(kept.points, kept.normals, start, target.points, target.boxes, limits)
     return replace(kept, shift=(x, y)) if found else None
 
@@ -326,7 +326,7 @@ def _image_motion(regions: tuple[Region, Region]) -> tuple[float, float, float]:
     a, b = regions
     if a is b or a.velocity_sigma <= 0.0 or b.velocity_sigma <= 0.0:
         return (np.nan, np.nan, np.nan)
-    variance = max(a.velocity_sigma, LEAST_SIGMA) ** 2 + max(b.velocity_sigma, LEAST_SIGMA) ** 2
+    variance = max(a.velocity_sigma, MIN_SIGMA) ** 2 + max(b.velocity_sigma, MIN_SIGMA) ** 2
     return b.velocity[0] - a.velocity[0], b.velocity[1] - a.velocity[1], variance
 
 
@@ -390,10 +390,10 @@ def relative_velocity(track: RelativeTrack, now: float, window_s: float) -> Rela
     Returns:
         The current velocity; None while too little is known.
     """
-    if len(track.path) <= LEAST_SAMPLES:
+    if len(track.path) <= MIN_SAMPLES:
         return None
     places = np.fromiter(chain.from_iterable(track.path), float, 6 * len(track.path)).reshape(-1, 6)
-    begin = first_recent(places, now, window_s, LEAST_SAMPLES)
+    begin = first_recent(places, now, window_s, MIN_SAMPLES)
     span = float(places[-1, 0] - places[begin, 0])
     if span < 0.6 * window_s - 1e-6:
         return None

@@ -151,8 +151,8 @@ def _windows(times: Floats, longest: float) -> NDArray[np.int64]:
     return begins
 
 
-LEAST_SAMPLES = 6
-LEAST_SHARE = 0.3
+MIN_SAMPLES = 6
+MIN_SHARE = 0.3
 """Filled share of the window from which lines are fitted."""
 
 
@@ -187,7 +187,7 @@ def fit_motion(
     pairs = count * (count - 1) // 2
     slope, sigma = np.full(pairs, np.nan), np.full(pairs, np.nan)
     motion, spread = np.full((3, count, 2), np.nan), np.full(count, np.nan)
-    if samples < LEAST_SAMPLES or times[samples - 1] - times[0] < LEAST_SHARE * window:
+    if samples < MIN_SAMPLES or times[samples - 1] - times[0] < MIN_SHARE * window:
         return slope, sigma, motion, spread
     begins = _windows(times, moving)
     half = begins[-1] + (samples - begins[-1]) // 2

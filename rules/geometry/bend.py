@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from visup.rules.geometry.regions import Floats
 
-LEAST_SAMPLES = 6
+MIN_SAMPLES = 6
 SIDE = 2
 """Least samples before the bend, and after it."""
 
@@ -28,7 +28,7 @@ def bend(times: Floats, values: Floats) -> float | None:
         Seconds, or None if there is no such bend.
     """
     n = len(times)
-    if n < LEAST_SAMPLES:
+    if n < MIN_SAMPLES:
         return None
     straight, _ = _fitted(times, values, None)
     best, at = math.inf, None

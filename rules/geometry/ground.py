@@ -19,7 +19,7 @@ Points = Sequence[tuple[float, float]]
 FOOT_SHARE = 0.15
 """Points this near to the lowest one, as a share of a body's height, are its foot points."""
 
-LEAST_SPREAD = 1e-6
+MIN_SPREAD = 1e-6
 """Relative area of triangles below which points are collinear."""
 
 
@@ -107,10 +107,10 @@ def _in_line(points: Points) -> bool:
     given = np.asarray(points, dtype=float)
     size = float(np.ptp(given, axis=0).max()) or 1.0
     if len(given) > 4:
-        return bool(np.linalg.svd((given - given.mean(axis=0)) / size)[1][-1] < LEAST_SPREAD)
+        return bool(np.linalg.svd((given - given.mean(axis=0)) / size)[1][-1] < MIN_SPREAD)
     triples = ((0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3))
     areas = [_area(*(given[k] / size for k in triple)) for triple in triples]
-    return min(areas) < LEAST_SPREAD
+    return min(areas) < MIN_SPREAD
 
 
 def _area(a: Floats, b: Floats, c: Floats) -> float:

@@ -39,7 +39,7 @@ TEMPLATE_POINTS = 96
 CLOSED_STEP = 2.0
 """Spacing of points below which an outline counts as closed, pixels."""
 
-MOST_POINTS = 200
+MAX_POINTS = 200
 """Most points of an outline measured against another one."""
 
 
@@ -162,7 +162,7 @@ def signed_distances(a: Region, b: Region) -> tuple[float, float]:
     """Signed distances of a region to another, nearest and farthest point.
 
     Args:
-        a: A region; at most `MOST_POINTS` points of its outline are used, and its part inside holes
+        a: A region; at most `MAX_POINTS` points of its outline are used, and its part inside holes
             of the other, which the outline misses.
         b: Another.
 
@@ -170,7 +170,7 @@ def signed_distances(a: Region, b: Region) -> tuple[float, float]:
         The least and the greatest distance of a's points to b's outline, pixels, negative inside b.
     """
     points, body = prepared_outline(a).closed, prepared_outline(b)
-    step = -(-len(points) // MOST_POINTS)
+    step = -(-len(points) // MAX_POINTS)
     x, y, _, _ = b.bbox
     least, most = signed_extent(points, step, body.closed, body.closed_boxes, body.mask, x, y)
     return least, max(most, _deepest_in_hole(a, b))

@@ -16,7 +16,7 @@ from visup.agent import Region
 from visup.rules.geometry._outlines_jit import longest_edge, resampled
 from visup.rules.geometry.regions import Floats, densified, outline
 
-LEAST_SHARE = 0.15
+MIN_SHARE = 0.15
 """Least share of a region's pixels in a part of it; smaller ones are specks of a segmenter."""
 
 
@@ -31,7 +31,7 @@ def rings(region: Region) -> list[Floats]:
         or the corners of its box if it has none.
     """
     contour = outline(region)
-    least = LEAST_SHARE * region.area
+    least = MIN_SHARE * region.area
     if not len(region.contour) or region.area - _pixels(region.contour) < least:
         return [contour]
     x, y, _, _ = region.bbox

@@ -123,13 +123,13 @@ def nearest(word: str, known: Iterable[str]) -> str:
 
 @lru_cache(maxsize=4096)  # each tried edit repeats all errors of its file
 def _nearest_of(word: str, names: tuple[str, ...]) -> str:
-    if len(names) <= MOST_LISTED:
+    if len(names) <= MAX_LISTED:
         return listed(names)
-    near = get_close_matches(word, names, n=MOST_LISTED, cutoff=0.0)
+    near = get_close_matches(word, names, n=MAX_LISTED, cutoff=0.0)
     return f"{listed(near)}, or one of {len(names) - len(near)} more (docs/rules.md)"
 
 
-MOST_LISTED = 8
+MAX_LISTED = 8
 """Most words in a list."""
 
 

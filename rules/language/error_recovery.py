@@ -24,8 +24,8 @@ from visup.rules.language.edit_costs import edit_costs
 from visup.rules.language.fixes import TextFix, fix_of
 from visup.rules.language.keywords import expected_words, near_word
 from visup.rules.language.repair import (
-    MOST_COMPARED,
-    MOST_REPAIRS,
+    MAX_COMPARED,
+    MAX_REPAIRS,
     WORDS,
     common_fixes,
     end_before,
@@ -61,7 +61,7 @@ class RepairBudget:
 
     def least_cost_repairs(self, text: str, start: str, since: int) -> Iterator[Repair]:
         """Least-cost corrections of a text from an offset on, while the budget lasts."""
-        least = max(0, self.left - MOST_READINGS * READING_COST)
+        least = max(0, self.left - MAX_READINGS * READING_COST)
 
         def may_go_on() -> bool:
             self.left -= READING_COST
@@ -70,7 +70,7 @@ class RepairBudget:
         yield from least_cost_repairs(text, since, edit_costs(_parser(), start, text), may_go_on)
 
 
-MOST_READINGS = 4000
+MAX_READINGS = 4000
 """Most parser configurations explored in a search for corrections."""
 READING_COST = 5
 """Cost of one configuration, in parsed characters."""
@@ -152,7 +152,7 @@ def read_repaired(
         fault = _syntax_fault(text, start)
         assert fault is not None
         repair = None
-        if len(repairs) < MOST_REPAIRS and budget.left >= 0:
+        if len(repairs) < MAX_REPAIRS and budget.left >= 0:
             repair = find_repair(
                 text,
                 fault,
@@ -271,7 +271,7 @@ def _with_edit(
     line, begin, length = place.text, place.column - 1, place.length
     known = ((repair, COMMON_FIX_BONUS) for repair in common_fixes(line, begin, length))
     others = ((repair, 0.0) for repair in edits(line, begin, length, EDIT_WORDS))
-    best, least, fewest = None, (before, inf), MOST_COMPARED
+    best, least, fewest = None, (before, inf), MAX_COMPARED
     for repair, granted in (*known, *others):
         hint = hint_of(place.text, repair)
         fix = None if hint is None else fix_of(block, place, hint)

@@ -121,12 +121,12 @@ def expected_words(wanted: AnySet[str]) -> str:
         wanted: Names of terminals of the grammar.
     """
     words = sorted({_TERMINALS.get(w, f"'{w.lower()}'") for w in wanted})
-    if len(words) > MOST_EXPECTED:
-        words = [w for w in words if w not in _SELDOM][:MOST_EXPECTED]
+    if len(words) > MAX_EXPECTED:
+        words = [w for w in words if w not in _SELDOM][:MAX_EXPECTED]
     return either(words)
 
 
-MOST_EXPECTED = 8
+MAX_EXPECTED = 8
 """Most expected words listed; rarer ones are left out."""
 _SELDOM = frozenset(
     f"'{w}'"

@@ -62,7 +62,7 @@ def _parsed(text: str, file: str) -> tuple[Rule, ...]:
         rules += found.tree
     errors += TypeChecker(text, file).twice(rules)
     errors = [pointing(text, error) for error in errors]
-    raise_all(sorted(errors, key=_position)[:MOST_FAULTS], RuleError)
+    raise_all(sorted(errors, key=_position)[:MAX_FAULTS], RuleError)
     return tuple(rules)
 
 
@@ -71,8 +71,8 @@ LONGEST_FILE = 200_000
 LONG_NUMBER = re.compile(r"[\d_]{41}|\d[eE]\+?\d{3}")
 """Numbers that would become infinite or lose digits."""
 LONGEST_RULE = 10_000
-MOST_RULES = 1_000
-MOST_FAULTS = 100
+MAX_RULES = 1_000
+MAX_FAULTS = 100
 """Most errors reported of a file."""
 
 
@@ -90,9 +90,9 @@ def check_length(text: str, file: str) -> None:
             "a number has more digits than a number can", where=file, expected="at most 40 digits"
         )
     starts = [m.start() for m in _HEAD.finditer(text)]
-    if len(starts) > MOST_RULES:
+    if len(starts) > MAX_RULES:
         what = f"the file has {len(starts)} rules"
-        raise RuleError(what, where=file, expected=f"at most {MOST_RULES}")
+        raise RuleError(what, where=file, expected=f"at most {MAX_RULES}")
     longest = max(b - a for a, b in pairwise([0, *starts, len(text)]))
     if longest > LONGEST_RULE:
         what = f"a rule has {longest} characters"

@@ -20,10 +20,10 @@ from visup.rules.correction.meaning_loss import COMMON_FIX_BONUS, SMALL_LOSS, me
 from visup.rules.language.common_mistakes import MISTAKE_PATTERNS
 from visup.rules.language.keywords import KEYWORDS
 
-MOST_REPAIRS = 12
-MOST_COMPARED = 4
+MAX_REPAIRS = 12
+MAX_COMPARED = 4
 """Edits that make a text correct and are compared by what they lose."""
-MOST_CORRECTIONS = 16
+MAX_CORRECTIONS = 16
 """Most corrections tried per error, cheapest first."""
 NEAR = 60
 """Characters before an error that are searched for its cause; the whole line always is."""
@@ -87,7 +87,7 @@ def find_repair(
     sound = min(sound, (trial.lost, usual), key=lambda found: found[0])
     further, trial.moved = trial.moved, 0.0
     since = max(0, min(at - NEAR, text.rfind("\n", 0, at) + 1))
-    least = trial.best(islice(corrected(since), MOST_CORRECTIONS))
+    least = trial.best(islice(corrected(since), MAX_CORRECTIONS))
     lost, whole = min(sound, (trial.lost, least), key=lambda found: found[0])
     if lost <= SMALL_LOSS or (lost == inf and usual is not None and further > MUCH_FURTHER):
         return whole or usual
@@ -140,7 +140,7 @@ class _RepairTrial:
                 self.moved = inf
                 if self.is_sound(changed):
                     whole.append((meaning_lost(self.text, changed) - granted, repair))
-                    if whole[-1][0] <= SMALL_LOSS or len(whole) == MOST_COMPARED:
+                    if whole[-1][0] <= SMALL_LOSS or len(whole) == MAX_COMPARED:
                         break
                     continue
                 readable = readable or repair

@@ -13,7 +13,7 @@ from math import exp, floor, inf, log, nan, sqrt
 from visup.compiled import compiled
 
 Pair = tuple[float, float]
-MOST_EXPONENT = 709.0
+MAX_EXPONENT = 709.0
 """Largest exponent of e without overflow."""
 
 
@@ -46,7 +46,7 @@ def rooted(v: Pair, p: float, q: float) -> Pair:
 @compiled
 def exponential(v: Pair, p: float, q: float) -> Pair:
     """The exponential; infinite on overflow."""
-    return exp(v[0]) if v[0] < MOST_EXPONENT else inf, exp(v[1]) if v[1] < MOST_EXPONENT else inf
+    return exp(v[0]) if v[0] < MAX_EXPONENT else inf, exp(v[1]) if v[1] < MAX_EXPONENT else inf
 
 
 @compiled
@@ -57,9 +57,9 @@ def raised(base: float, exponent: float) -> float:
     if base < 0.0 and exponent != floor(exponent):
         return nan
     size = log(abs(base)) * exponent if exponent != 0.0 else 0.0
-    if size > MOST_EXPONENT:
+    if size > MAX_EXPONENT:
         value = inf
-    elif abs(exponent) < MOST_EXPONENT and abs(base) < inf:
+    elif abs(exponent) < MAX_EXPONENT and abs(base) < inf:
         value = abs(base) ** exponent
     else:
         value = exp(size)

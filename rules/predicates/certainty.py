@@ -25,9 +25,9 @@ from visup.rules.presence.settings import PresenceSettings
 from visup.rules.wording.sentences import is_of_kind
 
 FRAGMENT_SETTINGS = FragmentSettings()
-LEAST_SHARE = 2 * PresenceSettings().least_share
+MIN_SHARE = 2 * PresenceSettings().least_share
 """Least share of the image of an object of its own, unless it is far away."""
-LEAST_CONFIDENCE = 0.5
+MIN_CONFIDENCE = 0.5
 START_S = PresenceSettings().start_s
 ENTRY_DISTANCE = 0.5
 """Greatest distance from the border of the first sighting of an object that came over it, in its sizes."""
@@ -38,7 +38,7 @@ LINK_DISTANCE = 0.5
 seen."""
 ENTRY_ADVANCE = 0.25
 """How far its far side must have moved away from that border since, in its sizes."""
-LEAST_VISIBLE = 0.5
+MIN_VISIBLE = 0.5
 """Least visible share of the area of an object that came in."""
 KEEP_OUT = "keep_out"
 """Prefix of the names of zones forbidden to all."""
@@ -57,8 +57,8 @@ def standalone(facts: Snapshot) -> Codes:
         return facts.codes_of_ids(())
     width, height = facts.mind.frame_size
     area = np.array([b.region.area for b in beliefs], dtype=float)
-    certain = np.array([b.region.confidence for b in beliefs]) >= LEAST_CONFIDENCE
-    certain &= area >= LEAST_SHARE * width * height
+    certain = np.array([b.region.confidence for b in beliefs]) >= MIN_CONFIDENCE
+    certain &= area >= MIN_SHARE * width * height
     certain &= (whole(facts) == YES) | (identified(facts) == YES)
     clearance = np.maximum(
         FRAGMENT_SETTINGS.apart * image_diagonal(facts.mind.frame_size),
@@ -144,7 +144,7 @@ def came_in(facts: Snapshot) -> Codes:
         if b.id not in memory.tracks:
             return MAYBE
         track = memory.tracks[b.id]
-        mostly_visible = track.visible_share >= LEAST_VISIBLE
+        mostly_visible = track.visible_share >= MIN_VISIBLE
         if b.first_seen <= begun and _is_inside(track.first_box, size):
             return NO
         return code(mostly_visible and _crossed_border(track.coherent_box, b.region.bbox, size))

@@ -16,7 +16,7 @@ from visup.rules.geometry.borders import common_border
 from visup.rules.geometry.regions import image_diagonal
 from visup.rules.predicates.snapshot import Codes, Floats, Snapshot, exact
 
-LEAST_ELONGATION = 1.3
+MIN_ELONGATION = 1.3
 """Least ratio of length to width for a meaningful long axis."""
 
 ALIGNED_DEG = 10.0
@@ -84,7 +84,7 @@ def _axis(belief: ObjectBelief) -> float:
         return np.nan
     xx, xy, yy = (m[k] / m["m00"] for k in ("mu20", "mu11", "mu02"))
     mean, spread = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
-    if mean + spread < LEAST_ELONGATION**2 * max(mean - spread, 1e-9):
+    if mean + spread < MIN_ELONGATION**2 * max(mean - spread, 1e-9):
         return np.nan
     return float(np.degrees(0.5 * np.arctan2(-2 * xy, xx - yy)) % 180.0)
 

@@ -23,7 +23,7 @@ CAME_SHARE = 0.25
 """Least approach of an object to another one within a second for it to have come there, as a share of the
 square root of its area."""
 
-LEAST_SIGHTINGS = 3
+MIN_SIGHTINGS = 3
 """Fewest sightings from which an approach is measured."""
 
 TimedCentroid = tuple[float, float, float]
@@ -296,7 +296,7 @@ def came_to(track: ObjectTrack, other: Region) -> bool:
 
     It is assumed that the camera hardly moved in that time.
     """
-    if len(track.centroids) < LEAST_SIGHTINGS:
+    if len(track.centroids) < MIN_SIGHTINGS:
         return False
     x, y = other.centroid
     (_, *first), *_, (_, *last) = track.centroids

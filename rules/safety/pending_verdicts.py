@@ -20,7 +20,7 @@ from visup.rules.wording.sentences import sentence, with_names
 
 MOMENT_SPACING = ticks(0.1)
 """Spacing of the moments at which pending verdicts are evaluated, microseconds."""
-MOST_MOMENTS = 20_000
+MAX_MOMENTS = 20_000
 """Most such moments: 33 minutes."""
 POSSIBILITY_CONFIDENCE = 0.4
 """Confidence of a sentence about a possibility."""
@@ -94,7 +94,7 @@ def _true_while_pending(
     assert memory.now is not None
     assert memory.after is not None
     states, found = memory.after, np.empty(max(1, compiled.search_table(n)[1]), dtype=np.int64)
-    for k in range(1, min(max(delays) // MOMENT_SPACING, MOST_MOMENTS) + 1):
+    for k in range(1, min(max(delays) // MOMENT_SPACING, MAX_MOMENTS) + 1):
         now, arena = memory.now + k * MOMENT_SPACING, _unknown_arena(compiled, n, layout.size)
         states = layout.step(states, now, np.full(layout.codes, MAYBE, dtype=np.int8), arena)
         for number, (rule, delay) in enumerate(zip(compiled.rules, delays, strict=True)):

@@ -30,7 +30,7 @@ from visup.tasks.grammar.structure import key_text
 
 C = TypeVar("C")
 
-MOST_STATES = 4_000
+MAX_STATES = 4_000
 """Larger product automata are compared up to this many states only."""
 
 Label = frozenset[tuple[str, frozenset[str]]]
@@ -101,7 +101,7 @@ def _courses(one: Automaton, two: Automaton) -> tuple[Course | None, Course | No
     todo: list[tuple[_Pair, Course]] = [(start, ())]
     seen = {start}
     found: list[Course | None] = [None, None]
-    while todo and len(seen) < MOST_STATES and None in found:
+    while todo and len(seen) < MAX_STATES and None in found:
         pair, course = todo.pop(0)
         ends = _ends(one, pair.first), _ends(two, pair.second)
         for side in (0, 1):

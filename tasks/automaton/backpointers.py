@@ -8,7 +8,7 @@ from itertools import zip_longest
 
 from visup.tasks.automaton.states import TaskStep
 
-MOST_BEHIND = 32  # completed steps remembered: at least this number, less than twice as many
+MAX_BEHIND = 32  # completed steps remembered: at least this number, less than twice as many
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,8 +68,8 @@ def extended(
     for step, since in zip_longest(left, begun):
         length = backpointer.length + 1 if backpointer else 1
         backpointer = Backpointer(step, now, backpointer, length, since)
-    if backpointer is not None and backpointer.length % MOST_BEHIND == 0:
-        return _cut(backpointer, MOST_BEHIND)
+    if backpointer is not None and backpointer.length % MAX_BEHIND == 0:
+        return _cut(backpointer, MAX_BEHIND)
     return backpointer
 
 

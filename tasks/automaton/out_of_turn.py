@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator
 from visup.tasks.automaton.automaton import END, Automaton
 from visup.tasks.automaton.states import TaskStep
 
-MOST_NODES = 200
+MAX_NODES = 200
 """Most nodes that are searched: of a task with very many states only the next ones are judged."""
 
 
@@ -55,7 +55,7 @@ def _reached(
     for current in ahead:
         steps = automaton.steps(current)
         yield from steps
-        if len(found) >= MOST_NODES:
+        if len(found) >= MAX_NODES:
             continue
         for transition in automaton.transitions(current):
             free = all(passes(steps[i]) for i in transition.left)

@@ -10,7 +10,7 @@ from visup.tasks.automaton.stage_hmm import WAITING, StageHmm
 from visup.tasks.automaton.states import TaskStep
 from visup.tasks.automaton.transitions import HiddenState
 
-MOST_NODES = 1_000  # beyond this number of nodes success counts as impossible
+MAX_NODES = 1_000  # beyond this number of nodes success counts as impossible
 SMALLEST = 1e-9  # less likely paths are not followed
 SWEEPS = 500  # most iterations over all nodes
 
@@ -27,7 +27,7 @@ class Prognosis:
         most: Number of nodes explored for the probability of success, breadth first.
     """
 
-    def __init__(self, automaton: Automaton, hmm: StageHmm, most: int = MOST_NODES) -> None:
+    def __init__(self, automaton: Automaton, hmm: StageHmm, most: int = MAX_NODES) -> None:
         self._automaton = automaton
         self._most = most
         self._process = hmm

@@ -16,7 +16,7 @@ from visup.tasks.automaton.automaton import END, NEW, Automaton, Transition
 from visup.tasks.automaton.stage_hmm import WAITING, PhaseKind, StageHmm
 from visup.tasks.automaton.states import TaskStep
 
-MOST_SPANS = 64  # cached time steps
+MAX_SPANS = 64  # cached time steps
 SPAN_DIGITS = 4  # time steps are rounded to a tenth of a millisecond
 
 
@@ -69,7 +69,7 @@ class HiddenTransitions:
         """The cached transitions for a time step; `transitions` adds to them."""
         span = round(dt, SPAN_DIGITS)
         if span not in self._passages:
-            if len(self._passages) >= MOST_SPANS:
+            if len(self._passages) >= MAX_SPANS:
                 self._passages.clear()
             self._passages[span] = {}
         return self._passages[span]

@@ -15,7 +15,7 @@ from visup.tasks.grammar.statement import NAME
 _CALL = re.compile(rf"{NAME}\s*\(\s*({NAME})\s*,\s*({NAME})\s*\)")
 _ANY_CALL = re.compile(rf"({NAME})\s*\(([^()<>]*)\)")
 _RECOVERY = re.compile(r"\s*on\s+failure\s+of\b")
-MOST_ACTORS = 4
+MAX_ACTORS = 4
 """Most actors of the file that are tried in the place of a missing one."""
 EXAMPLE_AMOUNTS = ("90 s", "20 px", "20 px/s", "20 deg/s", "20 %", "2 m")
 """Example values of a parameter."""
@@ -72,7 +72,7 @@ def _calls_with_more_actors(text: str, fault: Diagnostic) -> Iterator[str]:
     uses = Counter(a for actors in calls for a in actors)
     shared_uses = Counter(a for actors in calls if set(given) & set(actors) for a in actors)
     others = sorted({*uses} - {*given, *NEVER_NAMES}, key=lambda a: (-shared_uses[a], -uses[a], a))
-    for actor in (*others[:MOST_ACTORS], "other"):
+    for actor in (*others[:MAX_ACTORS], "other"):
         for actors in ((*given, actor), (actor, *given)):
             yield f"write `{call[1]}({', '.join(actors)})` in place of `{call[0]}`"
 

@@ -30,17 +30,17 @@ from visup.tasks.grammar.nodes import (
 LONGEST_FILE = 600_000
 """Maximum characters of a task with its includes; the longest shipped one has two thousand."""
 LONGEST_LINE = 20_000
-MOST_FAULTS = 100
+MAX_FAULTS = 100
 """Maximum number of reported mistakes of a file."""
-MOST_STAGES = 2_000
+MAX_STAGES = 2_000
 """Maximum number of stages of a file. A run with 2,000 starts within seconds; with 10,000 it takes a
 minute."""
 DEEPEST_STAGES = 100
 """Maximum nesting of stages, limited by Python's recursion depth."""
-MOST_START_STATES = 500
+MAX_START_STATES = 500
 """Maximum number of initial states of a course. With 256 a step takes 10 ms, with 4,000 half a second;
 parallel alternatives multiply."""
-MOST_TOGETHER = 12
+MAX_TOGETHER = 12
 """Maximum number of parallel courses, each of which may advance by itself."""
 
 
@@ -80,15 +80,15 @@ class BoundsCheck:
 
     def _sizes(self) -> Iterator[Diagnostic]:
         stages = self.grammar.task.stages
-        if len(stages) > MOST_STAGES:
+        if len(stages) > MAX_STAGES:
             what = f"the task has {len(stages)} stages"
-            place = stages[MOST_STAGES].span
-            yield self.source.fault("E239", what, place, f"at most {MOST_STAGES}")
+            place = stages[MAX_STAGES].span
+            yield self.source.fault("E239", what, place, f"at most {MAX_STAGES}")
         bodies = [s.body for s in stages if not isinstance(s.body, Actors)]
         for course in (c for body in bodies for c in walk(body)):
-            if isinstance(course, Together) and len(course.parts) > MOST_TOGETHER:
+            if isinstance(course, Together) and len(course.parts) > MAX_TOGETHER:
                 what = f"{len(course.parts)} things at the same time"
-                yield self.source.fault("E239", what, course.span, f"at most {MOST_TOGETHER}")
+                yield self.source.fault("E239", what, course.span, f"at most {MAX_TOGETHER}")
 
     def _stages(self) -> Iterator[Diagnostic]:
         for name in self._order:
@@ -97,10 +97,10 @@ class BoundsCheck:
                 what = f"stage `<{name}>` has more than {DEEPEST_STAGES} stages inside one another"
                 hint = "write those that follow one another side by side"
                 yield self.source.fault("E239", what, place, hint=hint)
-            if self._start_counts[name] > MOST_START_STATES:
+            if self._start_counts[name] > MAX_START_STATES:
                 what = f"stage `<{name}>` may begin in {self._start_count_text(name)} ways"
                 hint = "use fewer alternatives at the same time"
-                yield self.source.fault("E239", what, place, f"at most {MOST_START_STATES}", hint)
+                yield self.source.fault("E239", what, place, f"at most {MAX_START_STATES}", hint)
 
     @cached_property
     def _order(self) -> list[str]:
@@ -126,7 +126,7 @@ class BoundsCheck:
                 inside = (c for c in walk(body) if isinstance(c, Together))
                 most = max((self._start_count(c, start_counts) for c in inside), default=1)
                 start_counts[name] = min(
-                    max(most, self._start_count(body, start_counts)), MOST_START_STATES**2
+                    max(most, self._start_count(body, start_counts)), MAX_START_STATES**2
                 )
         return start_counts
 
@@ -139,7 +139,7 @@ class BoundsCheck:
                 return sum(self._start_count(p, start_counts) for p in parts)
             case Together(parts=parts):
                 return prod(
-                    min(self._start_count(p, start_counts), MOST_START_STATES) for p in parts
+                    min(self._start_count(p, start_counts), MAX_START_STATES) for p in parts
                 )
             case Repeated(item=item) | Counted(item=item):
                 return self._start_count(item, start_counts) + 1
@@ -160,6 +160,6 @@ class BoundsCheck:
     def _start_count_text(self, name: str) -> str:
         return (
             str(self._start_counts[name])
-            if self._start_counts[name] < MOST_START_STATES**2
+            if self._start_counts[name] < MAX_START_STATES**2
             else "countless"
         )

@@ -12,7 +12,7 @@ from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.tasks.actions.actions import ActionDefinition, contradict
 from visup.tasks.grammar.analysis import Grammar
 from visup.tasks.grammar.conditions import Fact
-from visup.tasks.grammar.copies import MOST_ROUNDS, alike
+from visup.tasks.grammar.copies import MAX_ROUNDS, alike
 from visup.tasks.grammar.graphs import reachable
 from visup.tasks.grammar.nodes import (
     Action,
@@ -36,7 +36,7 @@ from visup.tasks.grammar.nodes import (
 from visup.tasks.grammar.templates import names_in
 from visup.tasks.grammar.units import value
 
-MOST_IN_ANY_ORDER = 12
+MAX_IN_ANY_ORDER = 12
 
 
 @dataclass(frozen=True)
@@ -235,10 +235,10 @@ class CourseCheck:
                 yield self.source.fault(
                     "E233", what, course.span, f"`{corrected}`, or more things", hint
                 )
-            if isinstance(course, AnyOrder) and len(course.items) > MOST_IN_ANY_ORDER:
+            if isinstance(course, AnyOrder) and len(course.items) > MAX_IN_ANY_ORDER:
                 what = f"{len(course.items)} things in any order have too many orders to follow"
                 hint = "group those that follow one another"
-                expected = f"at most {MOST_IN_ANY_ORDER}"
+                expected = f"at most {MAX_IN_ANY_ORDER}"
                 yield self.source.fault("E234", what, course.span, expected, hint)
 
     def rounds(self, loop: AnyOrder) -> Iterator[Diagnostic]:
@@ -247,9 +247,9 @@ class CourseCheck:
         if most is not None and most < max(1, least):
             what = f"at least {least} and at most {most} rounds are never"
             yield self.source.fault("E233", what, loop.span, "a greater `at most`")
-        elif max(least, most or 0) > MOST_ROUNDS:
-            what = f"a loop with a new `{loop.new}` each time has at most {MOST_ROUNDS} rounds"
-            yield self.source.fault("E234", what, loop.span, f"at most {MOST_ROUNDS} times")
+        elif max(least, most or 0) > MAX_ROUNDS:
+            what = f"a loop with a new `{loop.new}` each time has at most {MAX_ROUNDS} rounds"
+            yield self.source.fault("E234", what, loop.span, f"at most {MAX_ROUNDS} times")
         if alike(loop):
             what = f"`for each new {loop.new}`, but what is to be done names no `{loop.new}`"
             near = closest(loop.new, names_in(loop.items[0]))

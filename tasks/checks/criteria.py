@@ -16,9 +16,9 @@ from visup.tasks.grammar.nodes import Actor, Name, Task
 from visup.tasks.grammar.structure import machines_of
 from visup.tasks.grammar.units import value
 
-MOST_COMPARED = 500
+MAX_COMPARED = 500
 """Most names that are compared with each other."""
-LEAST_SIMILARITY = 0.85
+MIN_SIMILARITY = 0.85
 """Similarity from which two names are considered the same."""
 CONTRARY_RANKS = ({"largest", "smallest"}, {"leftmost", "rightmost"}, {"highest", "lowest"})
 
@@ -90,7 +90,7 @@ class ActorUseCheck:
         reliable = [
             o for o in dict.fromkeys((*declared, *counts)) if o in declared or counts[o] > 1
         ]
-        if len(reliable) > MOST_COMPARED:
+        if len(reliable) > MAX_COMPARED:
             return
         for actors in (*(actors for _, actors, _ in self.uses), machines):
             for actor in actors:
@@ -127,5 +127,5 @@ def _is_misspelling(name: str, other: str) -> bool:
     transposed = len(name) > 3 and name[0] == other[0] and sorted(name) == sorted(other)
     return (
         transposed
-        or SequenceMatcher(None, name.casefold(), other.casefold()).ratio() >= LEAST_SIMILARITY
+        or SequenceMatcher(None, name.casefold(), other.casefold()).ratio() >= MIN_SIMILARITY
     )

@@ -9,7 +9,7 @@ from functools import cache, partial
 from visup.rules.language.diagnostics import Diagnostic, Source
 from visup.rules.language.fixes import pointing
 from visup.tasks.actions.actions import ALL_PERCEPTS, ActionDefinition, known_actions
-from visup.tasks.checks.bounds import MOST_FAULTS, text_fault
+from visup.tasks.checks.bounds import MAX_FAULTS, text_fault
 from visup.tasks.checks.files import include_root, read_beside
 from visup.tasks.checks.repairs import with_tested_hints
 from visup.tasks.checks.semantics import check_semantics
@@ -70,7 +70,7 @@ def _sorted_faults(
         what = "things are nested too deeply"
         return Task(()), [Diagnostic("E128", what, source.place(1, 1))]
     order = {name: i for i, name in enumerate((file, *source.included))}
-    return task, sorted(faults, key=lambda f: _order(f, order))[:MOST_FAULTS]
+    return task, sorted(faults, key=lambda f: _order(f, order))[:MAX_FAULTS]
 
 
 def _parsed_and_checked(

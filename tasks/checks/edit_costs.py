@@ -293,7 +293,7 @@ def _terminals_for(replacement: str) -> tuple[str, ...]:
     return _terminals_of(replacement) or ("NAME",)
 
 
-MOST_WIDENINGS, LONGEST_QUOTE = 6, 120
+MAX_WIDENINGS, LONGEST_QUOTE = 6, 120
 """How often a change is widened by a word to be unambiguous, and its maximum length in characters."""
 LONGEST_STATEMENT = 1500
 """Maximum characters of a statement that is searched completely for the cause of an error."""
@@ -356,7 +356,7 @@ def _offset(text: str, line: int, column: int) -> int:
 def hint_for(text: str, place: SourceLocation, repair: Repair) -> str | None:
     """A change as a hint; with surrounding words if it would be ambiguous."""
     wanted = repair.applied(text).split()
-    for _ in range(MOST_WIDENINGS):
+    for _ in range(MAX_WIDENINGS):
         old, new = " ".join(text[repair.begin : repair.end].split()), repair.new.strip()
         hint = f"write `{new}` in place of `{old}`" if new else f"leave `{old}` out"
         fix = fix_of(text, place, hint) if old and "`" not in old + new else None

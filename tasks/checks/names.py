@@ -145,7 +145,7 @@ class NameCheck:
                 if not self.parsed.lacking and amount.name not in self.parsed.defined:
                     hint = (
                         did_you_mean(amount.name, known, "`{}`")
-                        if len(known) < MOST_COMPARED
+                        if len(known) < MAX_COMPARED
                         else None
                     )
                     what = f"parameter `{amount}` is not declared"
@@ -316,7 +316,7 @@ class NameCheck:
 
 
 ANY_DIMENSION = "any"
-MOST_COMPARED = 500  # limit for pairwise comparison of names
+MAX_COMPARED = 500  # limit for pairwise comparison of names
 DIMENSION_WORDS = {
     "angular_speed": "speed of turning",
     "size": "real size",

@@ -28,10 +28,10 @@ from visup.tasks.grammar.units import UNITS
 
 CHARACTERS_TRIED = 60_000
 """Budget for the changes of one file: in a long file with many mistakes only the first have tested hints."""
-MOST_HINTS = 12
-MOST_COMPARED = 4
+MAX_HINTS = 12
+MAX_COMPARED = 4
 """Changes that help completely and are compared by what they lose."""
-MOST_CORRECTIONS, MOST_READINGS = 12, 3000
+MAX_CORRECTIONS, MAX_READINGS = 12, 3000
 """Per statement: corrections of several words that are tested, and parser states explored to find them."""
 READING_COST = 1
 """Cost of exploring a parser state, in checked characters."""
@@ -63,7 +63,7 @@ def with_tested_hints(
     tester, found = _HintTester(text, faults, check), []
     for number, fault in enumerate(faults):
         hint = None
-        if number < MOST_HINTS and tester.budget > 0 and not tester.help_of(fault):
+        if number < MAX_HINTS and tester.budget > 0 and not tester.help_of(fault):
             hint = tester.best_hint(fault)
         own_hint = (
             None if fix_of(text, fault.place, fault.hint) else fault.hint
@@ -135,7 +135,7 @@ class _HintTester:
 
     def correction_hints(self, fault: Diagnostic) -> Iterator[str]:
         """Corrections of several words of a statement with a syntax error."""
-        readings = MOST_READINGS
+        readings = MAX_READINGS
 
         def may_go_on() -> bool:
             nonlocal readings
@@ -144,7 +144,7 @@ class _HintTester:
             return readings > 0 and self.budget > 0
 
         if fault.code < "E2":
-            yield from islice(correction_hints(self.text, fault.place, may_go_on), MOST_CORRECTIONS)
+            yield from islice(correction_hints(self.text, fault.place, may_go_on), MAX_CORRECTIONS)
 
     def most_helpful(
         self, fault: Diagnostic, hints: Iterable[str], bonus: float
@@ -162,7 +162,7 @@ class _HintTester:
             helps = self.help_of(replace(fault, hint=hint))
             if helps == COMPLETE:
                 complete.append((self.meaning_loss(fault, hint) - bonus, hint))
-                if complete[-1][0] <= SMALL_LOSS or len(complete) == MOST_COMPARED:
+                if complete[-1][0] <= SMALL_LOSS or len(complete) == MAX_COMPARED:
                     break
             elif helps > most:
                 partial, most = hint, helps

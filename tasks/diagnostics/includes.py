@@ -35,8 +35,8 @@ def join_included(parsed: ParsedFile, source: Source, read: Read) -> ParsedFile:
 
 
 DEEPEST = 30  # nesting of includes
-MOST_FILES = 100
-MOST_CHARACTERS = 600_000
+MAX_FILES = 100
+MAX_CHARACTERS = 600_000
 
 
 @dataclass
@@ -44,7 +44,7 @@ class _Joiner:
     source: Source
     read: Read
     taken: set[str] = field(default_factory=set)
-    room: int = MOST_CHARACTERS
+    room: int = MAX_CHARACTERS
 
     def join(self, parsed: ParsedFile, chain: tuple[str, ...]) -> ParsedFile:
         whole = replace(parsed, task=replace(parsed.task, includes=()))
@@ -69,9 +69,9 @@ class _Joiner:
             return ParsedFile(Task(()))
         self.taken.add(file)
         self.room -= len(text)
-        if self.room < 0 or len(self.taken) > MOST_FILES:
+        if self.room < 0 or len(self.taken) > MAX_FILES:
             what = "the included files are larger than a task may be"
-            expected = f"at most {MOST_FILES} files, and {MOST_CHARACTERS} characters"
+            expected = f"at most {MAX_FILES} files, and {MAX_CHARACTERS} characters"
             return self.fault("E137", what, include, expected, None)
         source = self.source.included[file] = Source(text, file)
         code, odd = normalise(text, source)

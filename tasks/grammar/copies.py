@@ -17,9 +17,9 @@ from visup.tasks.grammar.criteria import Another, in_order
 from visup.tasks.grammar.nodes import Actor, Actors, Invariant, Stage
 from visup.tasks.grammar.templates import bound, names_in
 
-MOST_COPIES = 13
+MAX_COPIES = 13
 """Maximum number of copies: one more than the limit of `any order`, so that exceeding it is reported."""
-MOST_ROUNDS = 12
+MAX_ROUNDS = 12
 """Maximum number of rounds of a loop with a new actor in each."""
 
 
@@ -40,7 +40,7 @@ def in_turn(loop: AnyOrder) -> bool:
 
     The actors are interchangeable before anything is seen, so other orders are redundant.
     """
-    first = loop.new and copy_names(loop.new, 1 + MOST_ROUNDS - len(loop.items))[-1]
+    first = loop.new and copy_names(loop.new, 1 + MAX_ROUNDS - len(loop.items))[-1]
     return not first or first in names_in(loop.items[0])
 
 
@@ -71,7 +71,7 @@ def with_copies(declared: Sequence[Actor], stages: Sequence[Stage]) -> list[Acto
     courses = list(_copies(stages))
     kinds = dict.fromkeys(name for name, _, _ in courses)
     waited = {n: max((k for m, k, c in courses if m == n and not c.new), default=0) for n in kinds}
-    spare = {copy: n for n in kinds for copy in copy_names(n, MOST_ROUNDS)[waited[n] :]}
+    spare = {copy: n for n in kinds for copy in copy_names(n, MAX_ROUNDS)[waited[n] :]}
     known = {a.name: a for a in declared}
     actors = [a for a in declared if a.name not in kinds]
     for name in kinds:

@@ -16,8 +16,8 @@ from visup.tasks.grammar.actor_builder import ActorBuilder, span_of
 from visup.tasks.grammar.ast_courses import ConditionKind
 from visup.tasks.grammar.conditions import EVERY, Condition, Lasted, PartName, Period, Range, lasted
 from visup.tasks.grammar.copies import (
-    MOST_COPIES,
-    MOST_ROUNDS,
+    MAX_COPIES,
+    MAX_ROUNDS,
     as_rounds,
     copy_names,
     for_each_copy,
@@ -226,15 +226,15 @@ class _TaskBuilder(ActorBuilder):
 
     def for_copies(self, items: list[Any]) -> AnyOrder:
         first, said, plural, course = items
-        name, count = one_of(str(plural), course), min(int(said), MOST_COPIES)
+        name, count = one_of(str(plural), course), min(int(said), MAX_COPIES)
         made = (bound(course, {name: copy}) for copy in copy_names(name, count))
         return AnyOrder(tuple(made), span_of(first).to(course.span), copies=(name, count))
 
     def for_new(self, items: list[Any]) -> AnyOrder:
         first, _, said, course = items
         name = str(said)
-        made = tuple(bound(course, {name: copy}) for copy in copy_names(name, MOST_ROUNDS))
-        copies = (name, MOST_ROUNDS)
+        made = tuple(bound(course, {name: copy}) for copy in copy_names(name, MAX_ROUNDS))
+        copies = (name, MAX_ROUNDS)
         return AnyOrder(made, span_of(first).to(course.span), copies=copies, least=1, new=name)
 
     def already(self, items: list[Any]) -> Already:

@@ -46,7 +46,7 @@ STAGE_NAMES = {
 }
 MARGIN = 3.0
 """Deadline of a stage as a multiple of its longest duration in a good run."""
-LEAST_DEADLINE_S = 10.0
+MIN_DEADLINE_S = 10.0
 HOLD_SHARE = 0.5
 LONGEST_HOLD_S = 6.0
 """The last stage must hold for `HOLD_SHARE` of its shortest duration, capped at `LONGEST_HOLD_S`."""
@@ -298,7 +298,7 @@ def begin_of(row: Sequence[CourseEvent], occurrence: Occurrence) -> float | None
 
 def deadline(spans: Sequence[float]) -> int:
     """A deadline with margin, in whole seconds; from 20 s on in multiples of 5."""
-    raw = max(LEAST_DEADLINE_S, MARGIN * max(spans, default=inf))
+    raw = max(MIN_DEADLINE_S, MARGIN * max(spans, default=inf))
     return ceil(raw) if raw < 20 else 5 * ceil(raw / 5)
 
 

@@ -16,7 +16,7 @@ from visup.tasks.learning.traces import Symbol
 STAYING_NEAR = "keeping"
 """Action of the symbol of `Proximity`; no action of the task language."""
 LONGEST_LOOP = 6
-MOST_UNORDERED = 6
+MAX_UNORDERED = 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,7 +214,7 @@ def _plan(items: list[Occurrence], before: Callable[[Occurrence, Occurrence], bo
         return Series(tuple(_plan(b, before) for b in blocks))
     groups = _components(items, before)
     if len(groups) > 1:
-        return Unordered(tuple(_plan(g, before) for g in groups[:MOST_UNORDERED]))
+        return Unordered(tuple(_plan(g, before) for g in groups[:MAX_UNORDERED]))
     # A partial order that does not decompose: fall back to the mean order, which most runs follow.
     return Series(tuple(items))
 

@@ -15,9 +15,9 @@ from visup.tasks.learning.order import Loop, LoopCounts
 from visup.tasks.learning.relevance import CourseEvent
 from visup.tasks.learning.traces import Symbol
 
-LEAST_REPETITIONS = 4
+MIN_REPETITIONS = 4
 """Fewer repetitions in a run cannot be told from chance."""
-SHORTEST_PERIOD_S, MOST_PERIOD_RATIO = 0.25, 2.0
+SHORTEST_PERIOD_S, MAX_PERIOD_RATIO = 0.25, 2.0
 """Shortest period that is accepted, seconds, and greatest ratio of the longest to the shortest one."""
 MARGIN = 1.5
 """Factor by which a period may exceed the extremes of the good runs, either way."""
@@ -38,10 +38,10 @@ def periods_of(times: LoopCounts, rows: Sequence[Sequence[CourseEvent]]) -> dict
         meeting = repeated_meeting(loop)
         steps = [_steps(row, meeting) for row in rows] if meeting and least != most else []
         all_steps = [s for row in steps for s in row]
-        if not all_steps or min(map(len, steps)) < LEAST_REPETITIONS - 1:
+        if not all_steps or min(map(len, steps)) < MIN_REPETITIONS - 1:
             continue
         if (
-            max(all_steps) <= MOST_PERIOD_RATIO * min(all_steps)
+            max(all_steps) <= MAX_PERIOD_RATIO * min(all_steps)
             and min(all_steps) >= SHORTEST_PERIOD_S
         ):
             found[loop] = (min(all_steps), max(all_steps))

@@ -37,15 +37,15 @@ from visup.tasks.learning.order import (
 from visup.tasks.learning.relevance import CourseEvent, EventSequence
 from visup.tasks.learning.traces import ActionInterval, RunTrace, Span, Symbol, names_of
 
-LEAST_SHARE_OF_GOOD = 0.7
+MIN_SHARE_OF_GOOD = 0.7
 """A pair is elsewhere when it shares less than this part of the least shared outline in a good run.
 
 Of rendered boats, by the median at the end of a run (five seeds), those that come alongside share 0.83 of
 the least of three and more, bobbing down to 0.69; those that stop short or leave 0.62 and less, once 0.75."""
-MOST_SHARED = 0.6
+MAX_SHARED = 0.6
 """More shared outline in a good run counts as this much: 0.42 of an outline is required at most. What
 lies in front of its place shares 0.45 of its outline or all of it, as the camera stands (*pick*)."""
-LEAST_SHARED = 0.25
+MIN_SHARED = 0.25
 """Less shared outline in a good run than a side of a square is no evidence: only a corner or an end
 touches."""
 PLACED_S = 0.2
@@ -72,7 +72,7 @@ class FinalPlace:
     @property
     def least(self) -> int:
         """Least required share, in percent."""
-        return floor(100 * LEAST_SHARE_OF_GOOD * min(self.seen, MOST_SHARED))
+        return floor(100 * MIN_SHARE_OF_GOOD * min(self.seen, MAX_SHARED))
 
     @property
     def quantity(self) -> str:
@@ -121,7 +121,7 @@ def places_of(
         if not any(s != symbol and set(s[1]) & set(symbol[1]) for _, s in lasting):
             statistic = median if at_last or release is not None else min
             seen = _least_shared(runs, symbol[1], ends if at_last else last, statistic)
-            if seen >= LEAST_SHARED and (symbol == occurrence[0] or not at_last):
+            if seen >= MIN_SHARED and (symbol == occurrence[0] or not at_last):
                 yield FinalPlace(symbol, final, seen)
 
 
@@ -209,11 +209,11 @@ def _shared(mind: Mind, pair: Sequence[str]) -> float | None:
 
 GAP_MARGIN = 1.1
 """Factor by which the gap may exceed that of all good runs."""
-LEAST_TIME_SHARE = 0.75
+MIN_TIME_SHARE = 0.75
 """The required time is this share of the shortest one in a good run."""
 SHORTEST_STAY_S = 2.0
 """A shorter stay is merely the turn between approach and departure, seconds."""
-MOST_GAP_SHARE = 0.8
+MAX_GAP_SHARE = 0.8
 """The gap of a stay is at most this share of the greatest gap of each good run."""
 LEVELS_TRIED = 50
 """Number of gaps tried."""
@@ -252,13 +252,13 @@ def _proximity_courses(runs: Sequence[RunTrace], pair: Pair) -> list[list[Course
     gaps = [_gap_series(run.minds, pair) for run in runs]
     levels = [typical_gap(*g) for g in gaps]
     if not all(
-        0.0 < level <= MOST_GAP_SHARE * np.nanmax(g)
+        0.0 < level <= MAX_GAP_SHARE * np.nanmax(g)
         for level, (_, g) in zip(levels, gaps, strict=True)
     ):
         return None
     limit = 5 * ceil(GAP_MARGIN * max(levels) / 5)
     spans = [longest_span_below(*g, limit) for g in gaps]
-    least_s = floor(2 * LEAST_TIME_SHARE * min(b - a for a, b in spans)) / 2
+    least_s = floor(2 * MIN_TIME_SHARE * min(b - a for a, b in spans)) / 2
     if least_s < SHORTEST_STAY_S:
         return None
     proximity = Proximity(pair, limit, least_s)

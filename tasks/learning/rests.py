@@ -18,7 +18,7 @@ from visup.tasks.learning.traces import SUSTAINED_S, RunTrace, names_of
 
 REST = 0.02
 """Greatest speed of an actor at rest, image diagonals per second."""
-LEAST_ALLOWED = 0.04
+MIN_ALLOWED = 0.04
 """Lowest limit of the invariant, image diagonals per second. From masks, of 40 objects at rest in good worlds
 of fresh seeds none clearly moved faster than .01; of 15 that were rammed one moved at .05, one at
 .08 and all others at .1 or more."""
@@ -66,7 +66,7 @@ def resting_actors(runs: Sequence[RunTrace], actors: Collection[str]) -> Iterato
     for actor in sorted(actors):
         if all(at_rest(run, actor) for run in runs):
             fastest = max(run.fastest[actor] for run in runs)
-            allowed = max(LEAST_ALLOWED * diagonal, SPEED_MARGIN * fastest)
+            allowed = max(MIN_ALLOWED * diagonal, SPEED_MARGIN * fastest)
             yield RestingActor(actor, fastest, 5 * ceil(allowed / 5))
 
 

@@ -23,7 +23,7 @@ LONGEST_BRIDGED_GAP_S = 1.0
 """Shorter gaps, seconds, are bridged: relations flicker."""
 SUSTAINED_S = 0.2
 """A speed counts when it is sustained for this long, seconds; an outline may jump."""
-LEAST_S = {"converging": 0.6, "diverging": 0.6, "touching": 0.2, "coupled": 0.4, "decoupled": 0.2}
+MIN_S = {"converging": 0.6, "diverging": 0.6, "touching": 0.2, "coupled": 0.4, "decoupled": 0.2}
 """Shorter intervals, seconds, are noise."""
 
 
@@ -204,12 +204,12 @@ def _intervals(
     """
     for number, row in enumerate(rows):
         begin, until = row[0], row[1] if len(row) > 1 else end
-        if until - begin >= LEAST_S[symbol[0]]:
+        if until - begin >= MIN_S[symbol[0]]:
             yield ActionInterval(symbol, begin, until, begun or number > 0)
 
 
 def _decoupling(coupling: ActionInterval, end: float) -> ActionInterval | None:
     """The end of a coupling as an interval of its own."""
-    if coupling.symbol[0] != "coupled" or end - coupling.end < LEAST_S["decoupled"]:
+    if coupling.symbol[0] != "coupled" or end - coupling.end < MIN_S["decoupled"]:
         return None
     return ActionInterval(("decoupled", coupling.symbol[1]), coupling.end, end)

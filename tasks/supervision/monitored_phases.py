@@ -42,7 +42,7 @@ Requirement = tuple[tuple[str, ...], tuple[str, ...]]
 """(actors, relations): the relations that are required between these actors."""
 
 
-MOST_LATER = 40
+MAX_LATER = 40
 """Most later steps of a node, nearest first, that are watched for being done before their turn."""
 
 CARRIES = ("moving_together", "coupled")
@@ -132,14 +132,14 @@ class MonitoredPhases:
         return {}
 
     def later(self, node: int) -> tuple[TaskStep, ...]:
-        """The next steps after a node that would be out of turn if they were done now, at most `MOST_LATER`.
+        """The next steps after a node that would be out of turn if they were done now, at most `MAX_LATER`.
 
         These end once they have held, and take work: that two objects are apart, say, is true before anything
         is done. Steps that may have been satisfied before their turn are left out.
         """
         if node not in self._later:
             found = (s for s in later_steps(self.automaton, (node,)) if self._is_work(s))
-            self._later[node] = tuple(islice(found, MOST_LATER))
+            self._later[node] = tuple(islice(found, MAX_LATER))
         return self._later[node]
 
     def _is_work(self, step: TaskStep) -> bool:

@@ -23,7 +23,7 @@ from visup.tasks.grammar.nodes import AnyOrder, Task
 from visup.tasks.grammar.structure import key_text
 
 LONGEST = 200  # moments after which a random course is cut off
-MOST_LOOKED_AT = 50_000  # prefixes of courses explored by an enumeration
+MAX_LOOKED_AT = 50_000  # prefixes of courses explored by an enumeration
 
 Moment = tuple[str, ...]
 """The active steps as text: `<approach> converging(arm, satellite)`."""
@@ -65,12 +65,12 @@ def successors(task: Task, place: Position) -> tuple[Position, ...]:
 def traces(task: Task) -> Iterator[Trace]:
     """The courses of a task, each once, shortest first.
 
-    Stops after exploring `MOST_LOOKED_AT` prefixes.
+    Stops after exploring `MAX_LOOKED_AT` prefixes.
     """
     told: set[Trace] = set()
     looked_at: set[object] = set()
     todo: deque[tuple[Trace, Position]] = deque(((), p) for p in initial_positions(task))
-    for _ in range(MOST_LOOKED_AT):
+    for _ in range(MAX_LOOKED_AT):
         if not todo:
             return
         before, place = todo.popleft()

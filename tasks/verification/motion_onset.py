@@ -19,11 +19,11 @@ from visup.rules.relations.samples import SampleWindow
 LAG_S = 0.4
 """Interval over which the change of an outline is measured, seconds."""
 
-LEAST_ADVANCE = 0.012
+MIN_ADVANCE = 0.012
 """Least change of an outline's extent, image diagonals. In rendered worlds of ten kinds outlines change by at
 most 0.009 before anything moves, and a robot's by 0.03 within 0.6 s after it sets out."""
 
-LEAST_RATIO = 2.0
+MIN_RATIO = 2.0
 """Least ratio of the change of a slow body's extent to that of some other body for it to move by itself: a
 swaying camera moves all bodies alike, but for parallax."""
 
@@ -41,7 +41,7 @@ def moving_bodies(mind: Mind) -> frozenset[int]:
         return frozenset()
     moving_slowly = moving(now, relation_settings(mind).still_speed * diagonal)
     moving_slowly &= moving_more_than_others(window)
-    is_moving = moving_slowly | advancing_outlines(window, LEAST_ADVANCE * diagonal)
+    is_moving = moving_slowly | advancing_outlines(window, MIN_ADVANCE * diagonal)
     return frozenset(i for i, moves in zip(now.ids, is_moving.tolist(), strict=True) if moves)
 
 
@@ -68,7 +68,7 @@ def moving_more_than_others(window: SampleWindow) -> Mask:
     found = np.ones(len(span), dtype=bool)
     for i in range(len(span)):
         others = np.delete(span, i)[np.delete(known, i)]
-        found[i] = not len(others) or span[i] > LEAST_RATIO * others.min()
+        found[i] = not len(others) or span[i] > MIN_RATIO * others.min()
     return found
 
 

@@ -19,7 +19,7 @@ from visup.rules.relations.trend import SIGNS
 
 OPPOSITE = {"converging": "diverging", "diverging": "converging"}
 
-LEAST_CHANGE = 0.0067
+MIN_CHANGE = 0.0067
 """Least change of the distance, image diagonals: four pixels in an image of 480 x 360. Closing fingers change
 it by two."""
 
@@ -89,7 +89,7 @@ def new_trend(mind: Mind, trend: str, ids: tuple[int, ...]) -> Relation | None:
     speeds = [v for v in (now.one("speed", i) for i in ids) if v == v]  # NaN is not equal to itself
     limits = RiseLimits(
         sqrt(2.0) * relation_settings(mind).thresholds.noise_px,
-        LEAST_CHANGE * image_diagonal(mind.frame_size),
+        MIN_CHANGE * image_diagonal(mind.frame_size),
         SWAY_SHARE * min(speeds, default=0.0),
     )
     at = sudden_rise(window.times[known], SIGNS[trend] * distance[known], limits)

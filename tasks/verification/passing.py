@@ -20,10 +20,10 @@ from visup.rules.presence.object_tracks import presence_memory
 from visup.rules.relations.reasoner import kinematics, sample_window
 from visup.rules.relations.samples import SampleWindow
 
-LEAST_SAMPLES = 5
+MIN_SAMPLES = 5
 """Fewest samples of a relative path."""
 
-LEAST_PATH = 0.05
+MIN_PATH = 0.05
 """Least length of a path past another body, image diagonals."""
 
 STRAIGHT = 0.85
@@ -103,13 +103,13 @@ def went_past(mind: Mind, recession: Relation) -> bool:
     diagonal, times = image_diagonal(mind.frame_size), sample_window(mind).times
     path = _centres(mind, objects[0]) - _centres(mind, objects[1])
     path = path[~np.isnan(path).any(axis=1)]
-    if len(path) < LEAST_SAMPLES or recession.since < times[0]:
+    if len(path) < MIN_SAMPLES or recession.since < times[0]:
         return False
     thirds = path[[0, len(path) // 3, 2 * len(path) // 3, -1]]
     walked = np.hypot(*np.diff(thirds, axis=0).T)
     way = path[-1] - path[0]
     length = float(np.hypot(*way))
-    if length < LEAST_PATH * diagonal or length < STRAIGHT * float(walked.sum()):
+    if length < MIN_PATH * diagonal or length < STRAIGHT * float(walked.sum()):
         return False
     along = path @ way / length
     still = float(walked[-1]) > STILL_MOVING * length / 3
@@ -136,7 +136,7 @@ def went_round(mind: Mind, trend: Relation) -> bool:
     known = (window.times >= trend.since) & ~np.isnan(gap) & ~np.isnan(path).any(axis=1)
     gap, path = gap[known], path[known]
     way = float(np.hypot(*(path[-1] - path[0]))) if len(path) > 1 else 0.0
-    if way < LEAST_PATH * image_diagonal(mind.frame_size):
+    if way < MIN_PATH * image_diagonal(mind.frame_size):
         return False
     change = float(gap[-1] - gap[0])
     return (change if trend.name == "diverging" else -change) < RADIAL_SHARE * way

@@ -13,7 +13,7 @@ from visup.agent import Relation, Truth
 from visup.agent.model.fast_replace import replace
 from visup.tasks.grammar.nodes import StageCondition
 
-MOST_SPANS = 64
+MAX_SPANS = 64
 """Most pauses stored for one condition; beyond that the two oldest are merged, with their lengths added."""
 
 Span = tuple[float, float]
@@ -103,7 +103,7 @@ NO_PAUSES = PauseRecord()
 
 
 def _bounded(spans: tuple[Span, ...]) -> tuple[Span, ...]:
-    if len(spans) <= MOST_SPANS:
+    if len(spans) <= MAX_SPANS:
         return spans
     (start, end), (later, until), *others = spans
     return ((later - (end - start), until), *others)

@@ -112,7 +112,7 @@ def test_partitions_contain_each_run_once_in_any_order(
     """Whatever the order in which they came; and no partition is larger than it may be."""
     lake = Lake.create(tmp_path_factory.mktemp("order") / "lake")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(compacting, "MOST_RUNS", max_runs)
+        patch.setattr(compacting, "MAX_RUNS", max_runs)
         for part in (keys[:first], keys[first:]):
             compact(add(lake, run, *part))
         parts = read_manifest(lake.path).partitions

@@ -12,7 +12,7 @@ from visup.tasks.supervision.hypotheses import TaskHypotheses, TaskHypothesis
 from visup.tasks.supervision.monitored_phases import MonitoredPhases, SupervisionFilter
 from visup.tasks.verification.step_model import Observe
 
-MOST_HISTORIES = 4_000
+MAX_HISTORIES = 4_000
 LEAST = 1e-9  # histories with less of the mass are dropped, which the posterior accounts for
 
 
@@ -61,4 +61,4 @@ class Unmerged:
 
 def unmerged_filter(model: MonitoredPhases) -> SupervisionFilter:
     """The task filter of a model in which no two histories are merged."""
-    return TaskFilter(Unmerged(model), MOST_HISTORIES, LEAST)
+    return TaskFilter(Unmerged(model), MAX_HISTORIES, LEAST)

@@ -22,7 +22,7 @@ from visup.agent.storage.journal import segments
 from visup.agent.storage.journal_reader import JOURNAL, Recording, opened_readonly
 from visup.archive.extra import imported
 from visup.archive.inputs import RunInputs, with_inputs
-from visup.archive.joining.manifest import FOLDER, MOST_RUNS, Partition, read_manifest
+from visup.archive.joining.manifest import FOLDER, MAX_RUNS, Partition, read_manifest
 from visup.archive.run_tables import RunTables
 from visup.archive.schema import SCHEMA_VERSION, TABLES
 from visup.runs.resume import recorded_settings
@@ -60,7 +60,7 @@ class LakeSnapshot:
     def numbered(self) -> Iterator[tuple[tuple[str, ...], int, bool]]:
         """Runs with consecutive numbers in the index, the first number, and whether they are unjoined."""
         yield from ((part.runs, part.run_number(0), False) for part in self.partitions)
-        first = max((part.run_number(MOST_RUNS) for part in self.partitions), default=0)
+        first = max((part.run_number(MAX_RUNS) for part in self.partitions), default=0)
         yield self.loose, first, True
 
 

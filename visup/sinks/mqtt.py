@@ -9,7 +9,7 @@ from visup.agent.model.errors import ExtraMissingError, SettingsError
 from visup.sinks.lines import TIMEOUT_S, json_text
 
 PORT = 1883
-QOS_AT_LEAST_ONCE = 1
+QOS_AT_MIN_ONCE = 1
 
 
 class Mqtt:
@@ -49,7 +49,7 @@ class Mqtt:
             self._client.connect(*self._server)
             self._client.loop_start()
             self._connected = True
-        message = self._client.publish(self._topic, json_text(record), qos=QOS_AT_LEAST_ONCE)
+        message = self._client.publish(self._topic, json_text(record), qos=QOS_AT_MIN_ONCE)
         message.wait_for_publish(TIMEOUT_S)
         if not message.is_published():
             raise TimeoutError("the broker did not answer")

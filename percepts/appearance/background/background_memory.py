@@ -28,7 +28,7 @@ REDUCTION = 4
 FIRST_INTERVAL_S = 0.5
 """Interval between remembered frames, doubled whenever there are too many."""
 
-MOST_FRAMES = 8
+MAX_FRAMES = 8
 
 NOISE = 10
 """Largest difference of any channel that noise makes, levels of 8-bit Lab."""
@@ -84,7 +84,7 @@ class BackgroundMemory:
             return
         covered = {name: _covered(scene, blob) for name, blob in seen.items()}
         self.frames = (*self.frames, RememberedFrame(_small(scene), covered, _SAME))
-        if len(self.frames) > MOST_FRAMES:
+        if len(self.frames) > MAX_FRAMES:
             self.frames, self._interval = self.frames[::2], 2 * self._interval
         self._due = scene.time + self._interval - 1e-6
 

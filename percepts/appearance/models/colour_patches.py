@@ -21,14 +21,14 @@ from visup.percepts.appearance.models.moving_body import colour_similarity
 from visup.percepts.appearance.models.pose import PatchPose
 from visup.percepts.appearance.models.scene import Scene
 
-LEAST_EXCESS = 0.85
+MIN_EXCESS = 0.85
 """Least share of a patch's pixels with the object's colours, in excess of that of its surroundings."""
 
-LEAST_SIMILARITY = 0.45
+MIN_SIMILARITY = 0.45
 """Least intersection of the colour histograms of a patch and of the object. In 54 rendered and real clips no
-patch of another object passes both this and `LEAST_EXCESS`, but for identical bottles."""
+patch of another object passes both this and `MIN_EXCESS`, but for identical bottles."""
 
-LEAST_RATIO = 1.5
+MIN_RATIO = 1.5
 """Least ratio of the best patch's agreement to that of the second best."""
 
 SIZE_RANGE = (0.5, 1.6)
@@ -77,7 +77,7 @@ def unique_colour_patch(
     rival = found[1][0] if len(found) > 1 else 0.0
     if (
         not found
-        or rival * LEAST_RATIO > found[0][0]
+        or rival * MIN_RATIO > found[0][0]
         or not has_similar_colours(scene, appearance, found[0][1])
     ):
         return None
@@ -88,7 +88,7 @@ def unique_colour_patch(
 def has_similar_colours(scene: Scene, appearance: Appearance, blob: Blob) -> bool:
     """Whether a blob has the colours of an object and its surroundings do not."""
     excess, similarity = colour_similarity(scene, appearance, blob)
-    return excess > LEAST_EXCESS and similarity > LEAST_SIMILARITY
+    return excess > MIN_EXCESS and similarity > MIN_SIMILARITY
 
 
 def _patches(

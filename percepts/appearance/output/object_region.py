@@ -16,7 +16,7 @@ from visup.percepts.motion.outlines.region_outline import RegionOutline, describ
 
 VELOCITY_WINDOW_S = 0.2  # time over which a velocity is measured, seconds
 JITTER_PX = 0.5  # error of a pose, working pixels
-LEAST_SIGMA = 0.5  # pixels per second
+MIN_SIGMA = 0.5  # pixels per second
 
 
 def object_outline(blob: Blob, scene: Scene) -> RegionOutline | None:
@@ -75,7 +75,7 @@ def _velocity(
     span = now - before[0]
     if span <= 0:
         return (0.0, 0.0), 0.0
-    sigma = max(JITTER_PX / scale / span, LEAST_SIGMA)
+    sigma = max(JITTER_PX / scale / span, MIN_SIGMA)
     if track.state is TrackState.RESTING:
         return (0.0, 0.0), sigma
     back = pose.motion_to(before[1])

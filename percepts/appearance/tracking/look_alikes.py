@@ -9,7 +9,7 @@ from itertools import permutations
 import numpy as np
 
 from visup.percepts.appearance.models.appearance_model import Appearance, ViewModel
-from visup.percepts.appearance.models.colour_patches import LEAST_SIMILARITY
+from visup.percepts.appearance.models.colour_patches import MIN_SIMILARITY
 from visup.percepts.appearance.models.pose import PatchPose
 from visup.percepts.appearance.models.scene import Scene
 from visup.percepts.appearance.tracking.redetection import SURE, RedetectionCandidate, taught_pose
@@ -31,7 +31,7 @@ def look_alikes(views: Sequence[ViewModel]) -> LookAlikes:
 
 
 def _look_alike(appearance: Appearance, other: Appearance) -> bool:
-    if appearance.colours.shared(other.colours) < LEAST_SIMILARITY:
+    if appearance.colours.shared(other.colours) < MIN_SIMILARITY:
         return False  # without this, an object that is merely visible beside the other would match
     height, width = other.shape
     shown = Scene(0.0, [other.lab], np.ascontiguousarray(other.lab[..., 0]), (width, height))

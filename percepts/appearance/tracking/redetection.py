@@ -21,7 +21,7 @@ from visup.percepts.appearance.tracking.verification import Match, verify
 
 SURE = 0.6  # score that suffices by itself: no other object was observed to reach it
 FAIR, APART = 0.42, 1.5  # score that suffices if it exceeds those of other positions by a factor
-LEAST_COLOUR_EXCESS = 0.45
+MIN_COLOUR_EXCESS = 0.45
 """Least excess of the object's colours at a position over those around it."""
 NOISE = 0.15  # score that any position may have by chance
 MOVING_FAIR, MOVING_APART = 0.45, 1.2  # as FAIR and APART, among positions that changed recently
@@ -32,7 +32,7 @@ ROTATIONS = (-0.4, 0.4)
 BODY_SIMILARITY = 0.5
 """Least intersection of the colour histograms of a moving body and of an object."""
 BODY_SIZES = (0.5, 1.8)  # size (root of the area) of a moving body, relative to the object's
-LEAST_CUT_BODY_SIZE = 0.25  # least relative size of a moving body that the border cuts off
+MIN_CUT_BODY_SIZE = 0.25  # least relative size of a moving body that the border cuts off
 OCCLUDER_EXCESS = -0.5
 """Excess of an object's colours in a blob over it, up to which the blob occludes it."""
 OCCUPIED_SHARE = 0.5
@@ -181,10 +181,10 @@ def _body_candidate(
     unit = view.pose.scale * max(scene.size) / max(view.size)
     size = float(np.sqrt(body.blob.area)) / (2 * appearance.radius * unit)
     least, most = BODY_SIZES
-    if not (LEAST_CUT_BODY_SIZE if body.cut else least) < size < most:
+    if not (MIN_CUT_BODY_SIZE if body.cut else least) < size < most:
         return None
     excess, similarity = colour_similarity(scene, appearance, body.blob)
-    if excess < LEAST_COLOUR_EXCESS or similarity < BODY_SIMILARITY:
+    if excess < MIN_COLOUR_EXCESS or similarity < BODY_SIMILARITY:
         return None
     left, top, right, bottom = body.blob.window
     pose = PatchPose((left + right - 1) / 2, (top + bottom - 1) / 2, unit)
@@ -263,7 +263,7 @@ def _colour_match(
 ) -> list[Match]:
     """The position where an object's colours concentrate, if it is unique."""
     (most, pose), (second, _) = colour_peaks(scene, appearance, last, where)
-    if most < LEAST_COLOUR_EXCESS or second > most / APART:
+    if most < MIN_COLOUR_EXCESS or second > most / APART:
         return []
     share = min(1.0, most)
     return [Match(pose, share, share)]

@@ -26,7 +26,7 @@ Points = tuple[NDArray[np.float32], NDArray[np.float32]]
 
 UNCHANGED_SHARE = 0.97  # unchanged share of an object's window from which the object has not moved
 LOSE_S = 0.5  # how long an object is tracked without being observed
-LEAST_PEAK, LEAST_SHARE = 0.25, 0.3  # least filter peak and explained share of a tracked object
+MIN_PEAK, MIN_SHARE = 0.25, 0.3  # least filter peak and explained share of a tracked object
 UNSURE_PEAK = 0.4  # filter peak below which colours localise the object
 OWN_COLOURS = 0.25  # least excess of the object's colours over the surroundings
 MOVED_PX = 1.0  # least motion that ends rest, working pixels
@@ -141,7 +141,7 @@ def _track_moving(
     if peak < UNSURE_PEAK and colours > OWN_COLOURS and not firm:
         # It bends or turns: its colours localise it.
         best = _between(best, middle, 0.4)
-    if (peak > LEAST_PEAK and share > LEAST_SHARE) or colours > OWN_COLOURS:
+    if (peak > MIN_PEAK and share > MIN_SHARE) or colours > OWN_COLOURS:
         return replace(_observed_moving(track, best, peak, share, scene), colour_excess=colours)
     if scene.time - track.last_seen > LOSE_S:
         return replace(track, state=TrackState.HIDDEN, visible=None, rest=None, pose=best)

@@ -61,7 +61,7 @@ Mask = NDArray[np.bool_]
 
 POINTS = 24  # most points tracked on each object
 HOLD_S = 0.12  # how long a lost object is still reported at its predicted position
-LEAST_VISIBLE_SHARE = 0.04  # visible share below which an object is hidden
+MIN_VISIBLE_SHARE = 0.04  # visible share below which an object is hidden
 SEARCH_INTERVAL = 3  # frames between two searches of the whole image
 
 
@@ -276,7 +276,7 @@ class TaughtObjectTracker:
         if resting and rest is not None and np.array_equal(blob.mask, rest.blob.mask):
             return track if track.visible is rest.blob else replace(track, visible=rest.blob)
         blob = without_specks(blob)
-        if blob is None or blob.area < LEAST_VISIBLE_SHARE * appearance.area * pose.scale**2:
+        if blob is None or blob.area < MIN_VISIBLE_SHARE * appearance.area * pose.scale**2:
             return replace(track, visible=None)
         if resting:
             return replace(track, visible=blob)

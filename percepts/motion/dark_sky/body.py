@@ -15,7 +15,7 @@ PATH_S = 3.0  # how long a path is kept, seconds
 SPEED_S = 0.5  # time over which a velocity is measured, seconds
 DRIFT = 0.0006  # displacement, as a share of the image diagonal, from which a body has drifted
 STEADY_FACTOR = 4.0  # the same, as a multiple of the RMS deviation from uniform motion
-LEAST_S = 0.5  # shortest path from which a drift is measured, seconds
+MIN_S = 0.5  # shortest path from which a drift is measured, seconds
 SEPARATE_S = 1.0  # time alone after which a body is not taken for a part of what it touches later
 LARGE = 0.004  # share of the image that a body at rest must fill; captions fill less
 
@@ -86,7 +86,7 @@ class SkyBody:
     @property
     def has_speed(self) -> bool:
         """Whether its path is long enough for its velocity to have been measured on it."""
-        return self.path[-1][0] - self.path[0][0] >= LEAST_S / 2
+        return self.path[-1][0] - self.path[0][0] >= MIN_S / 2
 
     @property
     def is_fully_visible(self) -> bool:
@@ -113,7 +113,7 @@ class SkyBody:
             diagonal: Of the image, frame pixels.
         """
         path = np.asarray(self.path)
-        if self.cut or not self.alone or path[-1, 0] - path[0, 0] < LEAST_S:
+        if self.cut or not self.alone or path[-1, 0] - path[0, 0] < MIN_S:
             return False
         times = np.stack(
             [np.ones(len(path)), (path[:, 0] - path[0, 0]) / np.ptp(path[:, 0])], axis=1
@@ -157,7 +157,7 @@ class SkyBody:
         recent = [p for p in self.path if now - p[0] <= PATH_S] if continues else []
         path = (*recent, (now, *_anchor(self.template, corner, self.sides), *ground))
         duration = now - path[0][0]
-        velocity = self.velocity if duration < LEAST_S / 2 else _speed(path) or self.velocity
+        velocity = self.velocity if duration < MIN_S / 2 else _speed(path) or self.velocity
         settled = self.is_separate or (self.alone and duration >= SEPARATE_S)
         known = replace(self, corner=corner, path=path, velocity=velocity, last_seen=now)
         return replace(

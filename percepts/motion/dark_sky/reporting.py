@@ -15,7 +15,7 @@ from visup.percepts.motion.dark_sky.tracking import Bodies
 from visup.percepts.motion.outlines.region_outline import clean_mask, describe_mask
 from visup.percepts.motion.tracks.id_allocator import IdAllocator
 
-LEAST_OVERLAP = 0.5
+MIN_OVERLAP = 0.5
 """Share of a region's bright pixels that must be a body's for the region to belong to it."""
 BRIGHT = 0.3  # share of a region that must be brighter than the sky
 COVERED = 0.6  # share of a body cut by the border that must move; otherwise it is background
@@ -69,7 +69,7 @@ def regions_of_bodies(
         for k, body in enumerate(bodies):
             if (
                 body.last_seen == now
-                and np.count_nonzero(mine & body.visible[part]) > LEAST_OVERLAP * lit
+                and np.count_nonzero(mine & body.visible[part]) > MIN_OVERLAP * lit
             ):
                 found[k].append(region)
     return [_unless_ground(b, some) for b, some in zip(bodies, found, strict=True)]

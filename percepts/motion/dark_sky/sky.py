@@ -19,10 +19,10 @@ from visup.percepts.motion.outlines.region_outline import chosen, label_areas, r
 Mask = NDArray[np.bool_]
 
 DARKEST = 30  # levels below which a pixel may be sky
-LEAST_SKY = 0.15  # share of the image that must be dark
+MIN_SKY = 0.15  # share of the image that must be dark
 ONE_TONE = 0.9  # share of the dark pixels that must have the sky's tone: a dark room has many tones
 SPREAD = 6.0  # tolerance of the sky's tone, levels
-MOST_NOISE = 4.0  # greatest standard deviation of the sky's noise, levels
+MAX_NOISE = 4.0  # greatest standard deviation of the sky's noise, levels
 EVERY = 4  # stride of the pixels from which the sky's tone is estimated
 BRIGHTER = 9.0  # levels above the sky from which a pixel is a body: halos of compression are below
 SIGMAS = 5.0  # the same, in standard deviations of the sky's noise
@@ -94,13 +94,13 @@ def sky_tone(tone: NDArray[np.uint8]) -> tuple[float, float] | None:
     """
     some = tone[::EVERY, ::EVERY]
     dark = some[some < DARKEST].astype(np.float32)
-    if dark.size < LEAST_SKY * some.size:
+    if dark.size < MIN_SKY * some.size:
         return None
     level = float(np.median(dark))
     off = np.abs(dark - level)
     noise = 1.4826 * float(np.median(off))
     same = float(np.mean(off <= max(SPREAD, 3 * noise)))
-    return (level, noise) if noise <= MOST_NOISE and same >= ONE_TONE else None
+    return (level, noise) if noise <= MAX_NOISE and same >= ONE_TONE else None
 
 
 def without_halos(tone: NDArray[np.uint8], level: float) -> Mask:

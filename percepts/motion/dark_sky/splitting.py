@@ -21,7 +21,7 @@ from visup.percepts.motion.dark_sky.sky import Mask
 Tones = NDArray[np.uint8]
 
 REACH = 4  # search range around the predicted position, pixels
-MOST_DIFFERENCE = 30.0  # greatest RMS difference of levels at which a template matches
+MAX_DIFFERENCE = 30.0  # greatest RMS difference of levels at which a template matches
 DISTANCE_PENALTY = 10.0
 """Added to the mean squared difference per squared pixel from the predicted position."""
 FEWEST_PIXELS = 16  # fewest pixels on which templates are compared
@@ -70,7 +70,7 @@ def locate(tone: Tones, body: SkyBody, now: float) -> tuple[Corner, bool]:
         / area
     )
     _, _, at, _ = cv2.minMaxLoc(cost + DISTANCE_PENALTY * _SQUARED_DISTANCES)
-    fits = bool(cost[at[1], at[0]] <= MOST_DIFFERENCE**2)
+    fits = bool(cost[at[1], at[0]] <= MAX_DIFFERENCE**2)
     return ((x - REACH + at[0], y - REACH + at[1]) if fits else (x, y)), fits
 
 

@@ -22,20 +22,20 @@ from visup.percepts.motion.dark_sky.body import (
 from visup.percepts.motion.dark_sky.sky import Components, Mask
 from visup.percepts.motion.dark_sky.splitting import ComponentShare, locate, split_component
 
-LEAST_OVERLAP = 0.25  # least overlap of a body and its component, as a share of the smaller
+MIN_OVERLAP = 0.25  # least overlap of a body and its component, as a share of the smaller
 JOINED_GROWTH = 1.5
 """Growth of a component's area over its body's from which something else has joined."""
 # When a body that touches others gets a new template: it is visible enough and has moved, or is larger.
 VISIBLE_SHARE = 0.5  # least visible share of its template
 MOVED_PX = 3  # least displacement along either axis since the template was taken, pixels
 LARGER_SHARE = 1.03  # visible area, in areas of the template, that suffices by itself
-LEAST_VISIBLE_SHARE = 0.05  # visible share of its template below which a body is hidden
+MIN_VISIBLE_SHARE = 0.05  # visible share of its template below which a body is hidden
 PART_SHARE = 0.5
 """Area, as a share of the largest body's, up to which a new body may be a part of it."""
 NEW_S = 2.0  # age up to which a body has just come into view, seconds
 ALIKE_VELOCITY = 0.5
 """Difference of velocities, as a share of the greater, up to which two move alike."""
-LEAST_SPEED = 5.0  # speed from which two bodies can be said to move alike, pixels per second
+MIN_SPEED = 5.0  # speed from which two bodies can be said to move alike, pixels per second
 FORGOTTEN_S = 0.5  # how long the track of a body without a component is kept, seconds
 HIDDEN_S = 10.0  # the same while another body may hide it
 
@@ -108,7 +108,7 @@ def _component(body: SkyBody, frame: SkyFrame) -> int:
     mine = labels[inside][body.template.mask[part] & frame.components.bright[inside]]
     both = np.bincount(mine, minlength=len(areas)).astype(float)
     both[0] = 0
-    both[both <= LEAST_OVERLAP * np.minimum(areas, body.area)] = 0
+    both[both <= MIN_OVERLAP * np.minimum(areas, body.area)] = 0
     if body.cut and both[frame.components.cut].any():
         both[~frame.components.cut] = 0
     return int(both.argmax())
@@ -158,7 +158,7 @@ def _are_parts_of_one(a: SkyBody, b: SkyBody, now: float) -> bool:
         return True
     fast = max(float(np.hypot(*v)) for v in (a.velocity, b.velocity))
     apart = float(np.hypot(a.velocity[0] - b.velocity[0], a.velocity[1] - b.velocity[1]))
-    return fast > LEAST_SPEED and apart < ALIKE_VELOCITY * fast
+    return fast > MIN_SPEED and apart < ALIKE_VELOCITY * fast
 
 
 def _update_separate(body: SkyBody, mask: Mask, frame: SkyFrame) -> SkyBody:
@@ -181,7 +181,7 @@ def _update_touching(
         frame: The frame.
         fits: Whether its template matches at the corner.
     """
-    if np.count_nonzero(share.mask) < LEAST_VISIBLE_SHARE * body.area:
+    if np.count_nonzero(share.mask) < MIN_VISIBLE_SHARE * body.area:
         return body
     known = replace(body, visible=share.mask, occludes=share.occludes)
     if body.cut or (fits and _needs_new_template(body, corner, int(np.count_nonzero(share.mask)))):

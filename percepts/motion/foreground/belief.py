@@ -32,7 +32,7 @@ TEXTURE = NAMES.index("texture")
 CALM = 8.0  # texture, grey levels per pixel, at which the flow is half trusted
 TRUST = 1.0  # weight of a fully trusted value, relative to affinities
 SWEEPS = 8
-MOST_LOG_ODDS = 12.0  # log odds are clipped here
+MAX_LOG_ODDS = 12.0  # log odds are clipped here
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,7 +123,7 @@ def context_cues(belief: Belief, cues: FrameCues, alone: Floats) -> Floats:
 
 
 def _probability(log_odds: Floats) -> NDArray[Any]:
-    return 1 / (1 + np.exp(-np.clip(log_odds, -MOST_LOG_ODDS, MOST_LOG_ODDS)))
+    return 1 / (1 + np.exp(-np.clip(log_odds, -MAX_LOG_ODDS, MAX_LOG_ODDS)))
 
 
 def _carried(belief: Belief, cues: FrameCues) -> tuple[Floats, Floats]:

@@ -35,7 +35,7 @@ KEEP_BELIEF = 0.7  # the same for one reported before (hysteresis)
 OWN_BELIEF = 0.5  # least mean belief by its own cues to report one that never had a track
 WHOLE_SHARE = 0.9  # share of an object's moving cells in a track from which the track is the object
 TRACK_BELIEF = 0.5  # mean belief in the cells of such a track
-LEAST_PX = 0.25  # least residual motion, pixels per frame: twice the sampling error
+MIN_PX = 0.25  # least residual motion, pixels per frame: twice the sampling error
 RESIDUAL = NAMES.index("residual")
 NEWEST_WEIGHT = 0.4  # weight of the newest frame in a running mean
 CONNECTED_STEPS = 12  # steps from cell to cell over which cells connect to an object
@@ -179,7 +179,7 @@ def update_objects(
     known |= {k: MovingObject(k, 0, 0, now) for k in fresh}
     objects = ForegroundObjects(owner, belief.share, known, last_key)
     # Residual motion within the sampling error supports no object.
-    moved = cues.values[:, RESIDUAL] > math.log(0.1 + LEAST_PX)
+    moved = cues.values[:, RESIDUAL] > math.log(0.1 + MIN_PX)
     belief = replace(belief, alone=belief.alone * moved)
     return _with_track_cells(
         _observed(objects, belief, cues.area, now, conditions), tracks, cues.area

@@ -12,9 +12,9 @@ import numpy as np
 
 DECAY = 0.9
 """Weight of the earlier steps in each frame: they fade over some ten frames, whatever the frame rate."""
-LEAST_PATH_PX = 5.0
+MIN_PATH_PX = 5.0
 """Least path of the ground of a camera that shakes, working pixels."""
-MOST_NET_SHARE = 0.5
+MAX_NET_SHARE = 0.5
 """Share of that path below which net motion counts as none: shaking in place 0.03 to 0.28, pans 0.6 to 1."""
 
 
@@ -33,7 +33,7 @@ class CameraSway:
     @property
     def in_place(self) -> bool:
         """Whether the camera shakes without net displacement."""
-        return self.path > LEAST_PATH_PX and float(np.hypot(*self.net)) < MOST_NET_SHARE * self.path
+        return self.path > MIN_PATH_PX and float(np.hypot(*self.net)) < MAX_NET_SHARE * self.path
 
     def after(self, step: tuple[float, float]) -> CameraSway:
         """The sway after one more step (x, y) of the ground, working pixels."""

@@ -14,7 +14,7 @@ from visup.percepts.motion.layers._affine_jit import median
 from visup.percepts.motion.layers.affine import Affine, distances, fit_affine
 from visup.percepts.motion.layers.affine_rate import AffineRate
 
-LEAST_POINTS = 8
+MIN_POINTS = 8
 ALIKE = 6.0  # median squared Mahalanobis distance below which two motions are the same
 
 
@@ -45,14 +45,14 @@ def discover_layers(
     """
     out = []
     index = np.flatnonzero(free)
-    if len(index) < LEAST_POINTS:
+    if len(index) < MIN_POINTS:
         return []
     number = spatial_groups(c.xy[index], shape, cell)
     for g in range(1, int(number.max()) + 1):
         left = index[number == g]
         # A group may hold several motions: constraints that the first does not explain are tried again.
         for _ in range(3):
-            if len(left) < LEAST_POINTS:
+            if len(left) < MIN_POINTS:
                 break
             weight = np.zeros(len(c), dtype=np.float32)
             weight[left] = 1
@@ -60,7 +60,7 @@ def discover_layers(
             slack = layer_slack(start)
             model = fit_affine(c, weight, start, rigidity=10.0, rounds=6, slack=slack)
             fits = distances(model, c, slack)[left] < 9
-            if np.count_nonzero(fits) < max(LEAST_POINTS, 0.5 * len(left)):
+            if np.count_nonzero(fits) < max(MIN_POINTS, 0.5 * len(left)):
                 break
             out.append((model, left[fits]))
             left = left[~fits]

@@ -22,11 +22,11 @@ EVERY_S = 0.16  # spacing of images of the last second
 THINNING = 8.0  # images per e-fold of age
 HORIZON_S = 120.0
 POINTS = 48
-LEAST_POINTS = 4
-MOST_REMEMBERED = 256  # ids of regions; the oldest are forgotten first
+MIN_POINTS = 4
+MAX_REMEMBERED = 256  # ids of regions; the oldest are forgotten first
 FOUND_SHARE = 0.4  # share of a region's points that must be found for it to be in view
 BACK_PX = 1.0  # most forward-backward error of a point
-MOST_DIFFERENCE = 0.5  # mean difference of a point's neighbourhood, as a share of its contrast
+MAX_DIFFERENCE = 0.5  # mean difference of a point's neighbourhood, as a share of its contrast
 WINDOW = 9
 
 Grey = NDArray[np.uint8]
@@ -50,7 +50,7 @@ class BackwardTracker:
         Returns:
             The regions with `visible_since`.
         """
-        self._since = dict(list(self._since.items())[-MOST_REMEMBERED:])
+        self._since = dict(list(self._since.items())[-MAX_REMEMBERED:])
         due = not self._past or frame.time - self._past[-1][0] >= EVERY_S - 1e-6
         fresh = [r for r in regions if r.id not in self._since]
         if due or fresh:
@@ -83,7 +83,7 @@ class BackwardTracker:
         """The time of the oldest image to which a region can be tracked."""
         points = _points(image, region, size)
         since, newer = now, image
-        needed = max(LEAST_POINTS, FOUND_SHARE * len(points))
+        needed = max(MIN_POINTS, FOUND_SHARE * len(points))
         for time, older in reversed(self._past):
             points, found = _track_back(newer, older, points)
             if found < needed:
@@ -119,7 +119,7 @@ def _track_back(newer: Grey, older: Grey, points: Floats) -> tuple[Floats, int]:
     back, back_found, _ = _lucas_kanade(older, newer, there)
     off = np.linalg.norm((back - points)[:, 0], axis=1)
     inside = ((there[:, 0] >= 0) & (there[:, 0] < np.array(older.shape[::-1]))).all(axis=1)
-    similar = misfit < MOST_DIFFERENCE * _contrast(newer, points)
+    similar = misfit < MAX_DIFFERENCE * _contrast(newer, points)
     tracked = found & back_found & inside & similar & (off < BACK_PX)
     if not tracked.any():
         return points, 0

@@ -30,13 +30,13 @@ DELAY_S = 0.3  # ground must have been bare for this long to count: outlines lag
 HALO = 7  # pixels: a region's outline may be off by half as much
 SHADOW_BRIGHTNESS = (0.25, 0.93)  # brightness in a shadow, as a share of that of the ground
 CHANGED = 8.0  # grey levels by which a pixel must differ from the ground to be evidence
-LEAST, LEAST_SHARE = 25, 0.2  # pixels, and share of a region, that must differ
+LEAST, MIN_SHARE = 25, 0.2  # pixels, and share of a region, that must differ
 HUE = 0.06  # most difference of colour, as a share of brightness
 SHADOW_SHARE = 0.8  # share of the differing pixels that must be darker ground
 OPAQUE_SHARE = 0.5  # share below which it is certainly no shadow
-MOST_UNEVENNESS = 2.0
+MAX_UNEVENNESS = 2.0
 """Most ratio of the bright parts of a shadow to the dark ones, relative to the ground."""
-LEAST_TEXTURE = 1.5  # least standard deviation of comparable texture, grey levels
+MIN_TEXTURE = 1.5  # least standard deviation of comparable texture, grey levels
 SAME_TEXTURE = 0.5  # correlation of textures from which the ground shows through
 OTHER_TEXTURE = 0.2  # correlation below which it does not
 PLAIN_UNEVENNESS, PLAIN_HUE = 1.25, 0.03  # the same limits where the ground has no texture
@@ -142,7 +142,7 @@ def shadow_evidence(now: Floats, ground: Floats, where: Mask) -> float:
     """
     now, ground = np.ascontiguousarray(now), np.ascontiguousarray(ground)
     differs, bright, tint, power = changed_tones(now, ground, where, 3 * CHANGED**2)
-    if len(bright) < max(LEAST, LEAST_SHARE * np.count_nonzero(where)):
+    if len(bright) < max(LEAST, MIN_SHARE * np.count_nonzero(where)):
         return 0.0
     hue = np.sqrt(tint)
     dim = (
@@ -154,7 +154,7 @@ def shadow_evidence(now: Floats, ground: Floats, where: Mask) -> float:
     if shaded < OPAQUE_SHARE:
         return -FRAME_AGAINST
     low, high = np.quantile(bright[dim], [0.1, 0.9]).tolist()
-    if shaded < SHADOW_SHARE or high > MOST_UNEVENNESS * low:
+    if shaded < SHADOW_SHARE or high > MAX_UNEVENNESS * low:
         return 0.0
     seen_through = _texture_agreement(now, ground, differs)
     if seen_through is None:
@@ -171,7 +171,7 @@ def _texture_agreement(now: Floats, ground: Floats, where: Mask) -> float | None
     if inside.sum() < LEAST:
         return None
     a, b = (_detail(image, where)[inside] for image in (now, ground))
-    if float(b.std()) < LEAST_TEXTURE:
+    if float(b.std()) < MIN_TEXTURE:
         return None
     return float((a * b).mean() / (a.std() * b.std() + 1e-6))
 

@@ -11,8 +11,8 @@ from visup.percepts.motion.static_camera.background_model import edge_strength
 from visup.percepts.motion.static_camera.blob_track import BlobTrack, BlobTracks, crop
 
 LIMB = 0.35  # largest area of a limb, as a share of its object
-LEAST_DISPLACEMENT = 3.0  # least displacement of a side before an object is reported, pixels
-LEAST_SHARE = 0.25  # the same as a share of the square root of its area
+MIN_DISPLACEMENT = 3.0  # least displacement of a side before an object is reported, pixels
+MIN_SHARE = 0.25  # the same as a share of the square root of its area
 FOLLOWED = 0.5  # least displacement of the opposite side, as a share of that of the first
 STRAIGHT = 0.6  # least net displacement as a share of the path length
 DIMMED = (0.3, 0.65)  # brightness in a deep shadow, as a share of the background's
@@ -32,7 +32,7 @@ def is_salient_blob(s: BlobTrack) -> bool:
     if s.shadow:
         return False
     gone = s.displacement()
-    least = max(LEAST_DISPLACEMENT, LEAST_SHARE * float(np.sqrt(np.count_nonzero(s.shape))))
+    least = max(MIN_DISPLACEMENT, MIN_SHARE * float(np.sqrt(np.count_nonzero(s.shape))))
     left = (gone > least) & (gone > STRAIGHT * s.path_length)
     if not s.cut:
         # A blob that merely grows or shrinks, as a shadow on an object at rest, moves one side only.

@@ -37,7 +37,7 @@ from visup.percepts.motion.static_camera.side_by_side import (
 )
 from visup.percepts.motion.static_camera.templates import best_template_shift, split_blob
 
-LEAST_CLAIM = 0.25  # least overlap for a claim, as a share of the smaller of object and blob
+MIN_CLAIM = 0.25  # least overlap for a claim, as a share of the smaller of object and blob
 VISIBLE_SHARE = 0.2  # visible share of its template below which an object is hidden
 FRAGMENT = 0.2  # largest gap between fragments of one object, as a share of its length
 FOLLOW = 0.35  # weight of a newly measured velocity
@@ -101,7 +101,7 @@ def _claims(ahead: Sequence[BlobTrack], view: Foreground) -> list[list[int]]:
     for s in ahead:
         at, own = template_window(s, view.labels.shape)
         common = np.bincount(crop(view.labels, at)[crop(s.shape, own)], minlength=view.count + 1)
-        least = LEAST_CLAIM * np.minimum(areas, np.count_nonzero(s.shape))
+        least = MIN_CLAIM * np.minimum(areas, np.count_nonzero(s.shape))
         claims.append([b for b in range(1, view.count + 1) if common[b] > least[b]])
     _assign_unclaimed(ahead, view, claims, areas)
     return claims

@@ -9,10 +9,10 @@ from visup.percepts.motion.layers.affine import STILL, Affine, distances
 from visup.percepts.motion.layers.dominant_motion import BALANCE_GRID
 from visup.percepts.motion.tracks.measurements import FrameMeasurements
 
-LEAST_INFORMATION = 16.0
+MIN_INFORMATION = 16.0
 """Least information of a point that would reveal motion, 1 / pixels squared."""
 REST_DISTANCE = 9.0  # squared Mahalanobis distance up to which a point fits a static camera
-LEAST_FILLED = 0.5  # least share of the grid cells that must hold points with that information
+MIN_FILLED = 0.5  # least share of the grid cells that must hold points with that information
 STATIC_SHARE = 0.85  # least share of those cells that fit when the camera is static
 MOVING_SHARE = 0.6  # share of those cells below which the camera moves
 
@@ -35,7 +35,7 @@ def is_camera_static(scene: FrameMeasurements) -> bool | None:
 def _still_share(scene: FrameMeasurements, number: int) -> float | None:
     """Share of the grid cells at rest in one measurement; None if too few cells hold points."""
     c = scene.measured[number].constraints
-    use = c.information[:, 0] + c.information[:, 2] > LEAST_INFORMATION
+    use = c.information[:, 0] + c.information[:, 2] > MIN_INFORMATION
     use &= scene.owner[scene.cell_of(c)] == 0
     rows, cols = BALANCE_GRID
     place = grid_cells(c.xy, scene.image.shape, BALANCE_GRID)[use]
@@ -43,6 +43,6 @@ def _still_share(scene: FrameMeasurements, number: int) -> float | None:
     all_ = np.bincount(place, minlength=rows * cols)
     rest = np.bincount(place[fits], minlength=rows * cols)
     filled = all_ >= 2
-    if filled.sum() < LEAST_FILLED * rows * cols:
+    if filled.sum() < MIN_FILLED * rows * cols:
         return None
     return float(np.mean(rest[filled] > 0.5 * all_[filled]))

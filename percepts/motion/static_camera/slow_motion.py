@@ -35,12 +35,12 @@ from visup.percepts.motion.tracks.measurements import FrameMeasurements
 Mask = NDArray[np.bool_]
 SPANS_S = (0.15, 0.3, 0.6)  # spans over which change is measured, seconds, shortest first
 MEMORY_S = 0.5  # time constant of the change over one frame, seconds
-LEAST_NOISE = 0.5  # least mean squared change over one frame, squared grey levels
+MIN_NOISE = 0.5  # least mean squared change over one frame, squared grey levels
 AVERAGE = 1.0  # standard deviation of the average of change about a pixel, pixels
 SURE, LIKELY = 8.0, 3.0  # squared change over a span, in units of that over one frame: hysteresis
 NOISE_NEIGHBOURHOOD = 5
 """Width of the surroundings whose greatest change over one frame counts, pixels."""
-LEAST_GRADUAL_SHARE = 1.0
+MIN_GRADUAL_SHARE = 1.0
 """Least change over one frame, as a share of what a steady shift would cause."""
 REGION_WEIGHT, CHANGE_WEIGHT = 2.0, 0.3  # seed weight of a region, and of slow change, as body
 BARE_WEIGHT = 1.0  # seed weight, as ground, of ground that no object has hidden for long
@@ -48,10 +48,10 @@ FLAT_WEIGHT = 0.05
 """Seed weight, as ground, of an unchanged cell without structure: change would not show."""
 STRUCTURE_GRADIENT = 3.0  # gradient at which a cell has structure, grey levels per pixel
 LINK_WEIGHT = 0.3  # weight of the affinity of neighbouring cells
-LEAST_THICKNESS = 13
+MIN_THICKNESS = 13
 """Least thickness of an added part, pixels: a thinner one may be an error of the outline."""
 CLOSED_GAP = 0.5  # gaps that are closed, as a share of the square root of the regions' area
-MOST_CLOSED_GAP = 0.04  # the same as a share of the image's longer side
+MAX_CLOSED_GAP = 0.04  # the same as a share of the image's longer side
 UNCOVERED_S = 0.3  # how long ground that was hidden must be seen to be certainly bare, seconds
 NEVER_HIDDEN_S = 2.4
 """The same for ground that was never hidden: a body may have been there from the start."""
@@ -97,7 +97,7 @@ class SlowChangeDetector:
         nearby = cv2.dilate(
             self._mean_change, np.ones((NOISE_NEIGHBOURHOOD, NOISE_NEIGHBOURHOOD), np.uint8)
         )
-        noise = np.maximum(nearby, max(float(np.median(self._mean_change)), LEAST_NOISE))
+        noise = np.maximum(nearby, max(float(np.median(self._mean_change)), MIN_NOISE))
         seconds, out = image.time - past[-1].time, None
         for span in SPANS_S:
             old = [p for p in past if image.time - p.time >= 0.9 * span]
@@ -106,7 +106,7 @@ class SlowChangeDetector:
             change = _averaged(_squared_change(image, old[-1]))
             # A pixel that changed once and is at rest now is uncovered ground, or an object that has stopped,
             # which needs no completion.
-            gradual = last > LEAST_GRADUAL_SHARE * (seconds / span) ** 2 * change
+            gradual = last > MIN_GRADUAL_SHARE * (seconds / span) ** 2 * change
             found = _likely_pixels(np.asarray(change / noise, np.float32)) & gradual
             out = found if out is None else out | found
         if out is None or self._parts is None:
@@ -147,7 +147,7 @@ class GroundBelief:
 
 
 def is_nearly_still(velocity: tuple[float, float], scale: float) -> bool:
-    """Whether a region moves by less than `LEAST_THICKNESS` within the longest span.
+    """Whether a region moves by less than `MIN_THICKNESS` within the longest span.
 
     A faster region is segmented by its motion, and uncovers ground, whose change would be taken for its own.
 
@@ -156,7 +156,7 @@ def is_nearly_still(velocity: tuple[float, float], scale: float) -> bool:
         scale: Working pixels per frame pixel.
     """
     speed = float(np.hypot(*velocity)) * scale
-    return speed * max(SPANS_S) < LEAST_THICKNESS
+    return speed * max(SPANS_S) < MIN_THICKNESS
 
 
 def extend_by_slow_parts(
@@ -214,16 +214,14 @@ def _body_cells(own: Mask, slow: Mask, bare: Floats | None, scene: FrameMeasurem
 
 
 def _thick_parts(added: Mask) -> Mask:
-    """(h, w) bool: parts at least about `LEAST_THICKNESS` wide; thinner ones are errors of the outline."""
+    """(h, w) bool: parts at least about `MIN_THICKNESS` wide; thinner ones are errors of the outline."""
     if not added.any():
         return added
-    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (LEAST_THICKNESS, LEAST_THICKNESS))
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (MIN_THICKNESS, MIN_THICKNESS))
     core = cv2.morphologyEx(
-        np.pad(added.view(np.uint8), LEAST_THICKNESS, mode="edge"), cv2.MORPH_OPEN, disc
+        np.pad(added.view(np.uint8), MIN_THICKNESS, mode="edge"), cv2.MORPH_OPEN, disc
     )
-    near = cv2.dilate(
-        core[LEAST_THICKNESS:-LEAST_THICKNESS, LEAST_THICKNESS:-LEAST_THICKNESS], disc
-    )
+    near = cv2.dilate(core[MIN_THICKNESS:-MIN_THICKNESS, MIN_THICKNESS:-MIN_THICKNESS], disc)
     return np.asarray((near > 0) & added)
 
 
@@ -249,7 +247,7 @@ def _closed_mask(own: Mask, slow: Mask) -> Mask:
 
     A body without texture changes only along its outline; closing includes what that encloses.
     """
-    reach = int(min(CLOSED_GAP * np.sqrt(np.count_nonzero(own)), MOST_CLOSED_GAP * max(own.shape)))
+    reach = int(min(CLOSED_GAP * np.sqrt(np.count_nonzero(own)), MAX_CLOSED_GAP * max(own.shape)))
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
     both = own | slow
     x, y, w, h = cv2.boundingRect(both.view(np.uint8))

@@ -65,7 +65,7 @@ YOUNG_S = 0.3  # how long a track that was never reported is continued while mis
 SIZE = 768  # longer side of the background model, pixels
 KNOWN = 0.6  # least foreground share of a region when the background shows what lies behind it
 START_S = 2.4  # age of the background up to which it may contain a newly reported object, seconds
-STRIDE_PX, MOST_STRIDES = 4.0, 32  # step of a swept mask, background pixels; most steps
+STRIDE_PX, MAX_STRIDES = 4.0, 32  # step of a swept mask, background pixels; most steps
 HALO = 7  # dilation of regions, pixels: an outline may be off by half as much
 
 
@@ -301,7 +301,7 @@ def swept_mask(here: Mask, region: Region, seconds: float, scale: float) -> Mask
         scale: Background pixels per frame pixel.
     """
     path = -np.asarray(region.velocity) * seconds * scale
-    steps = int(np.clip(np.ceil(np.hypot(*path) / STRIDE_PX), 1, MOST_STRIDES))
+    steps = int(np.clip(np.ceil(np.hypot(*path) / STRIDE_PX), 1, MAX_STRIDES))
     out = here.copy()
     for k in range(1, steps + 1):
         dx, dy = path * k / steps

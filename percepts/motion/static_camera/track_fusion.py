@@ -22,17 +22,17 @@ from visup.percepts.motion.static_camera.side_by_side import SLENDER, are_side_b
 from visup.percepts.motion.tracks.id_allocator import IdAllocator
 
 FOREGROUND_SHARE = 0.4  # foreground share of a region from which background subtraction shows it
-LEAST_OVERLAP = 0.5  # least overlap of two outlines of one object, as a share of the smaller
+MIN_OVERLAP = 0.5  # least overlap of two outlines of one object, as a share of the smaller
 WHOLE_IOU = 0.6  # intersection over union above which background subtraction shows all of an object
 MAIN_SHARE = 0.4
 """Least share of a region that a blob must fill to take over its id: a limb fills less."""
 MISSED_SHARE = 0.15
 """Share of a region's motion evidence outside of the foreground, above which parts are missed."""
-LEAST_SIZE = 0.35  # least size of a body in a region, as a share of the largest body there
+MIN_SIZE = 0.35  # least size of a body in a region, as a share of the largest body there
 LARGE_FACTOR = 4.0  # least area of a region of which parts may be missed, in `well_known_area`
 EVIDENCE_DECAY = 0.9  # decay factor of motion evidence per frame
 NEAR_PX = 5  # tolerance, pixels: points lie on edges, half of them outside of the blob
-LEAST_AREA = 0.0005  # least area of an object when first reported, as a share of the image
+MIN_AREA = 0.0005  # least area of an object when first reported, as a share of the image
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -189,7 +189,7 @@ class TrackFusion:
                 small = r.id in self._reported_without_blob and r.area < frame.well_known_area
                 if not small or any(common_pixels(s, r) for s in out):
                     continue
-            out = [s for s in out if not common_pixels(s, r) >= LEAST_OVERLAP * s.area]
+            out = [s for s in out if not common_pixels(s, r) >= MIN_OVERLAP * s.area]
             out.append(replace(r, id=self._public_id(r, {s.id for s in out}, ids)))
         return tuple(sorted(out, key=lambda r: r.id))
 
@@ -200,7 +200,7 @@ class TrackFusion:
         alike.
         """
         return any(
-            s.id == self._known_id(r) and common_pixels(s, r) > LEAST_OVERLAP * min(s.area, r.area)
+            s.id == self._known_id(r) and common_pixels(s, r) > MIN_OVERLAP * min(s.area, r.area)
             for s in blobs
         )
 
@@ -225,7 +225,7 @@ class TrackFusion:
         numbered: Mapping[int, Region],
     ) -> bool:
         """Whether a blob is a new object: large enough, salient, and not a part of another one."""
-        large = own.area >= LEAST_AREA * (frame.size[0] * frame.size[1])
+        large = own.area >= MIN_AREA * (frame.size[0] * frame.size[1])
         return large and is_salient_blob(s) and not self._is_part(own, regions, numbered)
 
     def _with_missed_parts(
@@ -295,7 +295,7 @@ class TrackFusion:
             host = numbered.get(self._known_id(r))
             if (
                 host is not None
-                and common_pixels(own, r) > LEAST_OVERLAP * own.area
+                and common_pixels(own, r) > MIN_OVERLAP * own.area
                 and are_near(own, host)
             ):
                 return True
@@ -315,7 +315,7 @@ class TrackFusion:
     def _note_alias(self, r: Region, reported: Sequence[Region]) -> None:
         """Record the id under which a region of the layers is reported."""
         best = max(reported, key=lambda s: common_pixels(s, r), default=None)
-        if best is not None and common_pixels(best, r) > LEAST_OVERLAP * min(r.area, best.area):
+        if best is not None and common_pixels(best, r) > MIN_OVERLAP * min(r.area, best.area):
             self._alias[r.id] = best.id
 
 
@@ -326,8 +326,8 @@ def _blobs_covering(r: Region, seen: Mapping[int, Region]) -> list[int]:
     """
     common = {key: common_pixels(s, r) for key, s in seen.items()}
     order = sorted(common, key=lambda key: -common[key])
-    least = LEAST_SIZE * common[order[0]] if order else 0.0
-    large = [key for key in order if common[key] > max(LEAST_OVERLAP * seen[key].area, least)]
+    least = MIN_SIZE * common[order[0]] if order else 0.0
+    large = [key for key in order if common[key] > max(MIN_OVERLAP * seen[key].area, least)]
     boxes = combinations((seen[key].bbox for key in large), 2)
     people = all(are_side_by_side(a, b, SLENDER) for a, b in boxes)
     both = large if people and len(large) > 1 else []
@@ -349,7 +349,7 @@ def _visible_regions(blobs: BlobTracks, frame: FusionFrame) -> dict[int, Region]
 
 
 def _is_mostly_in(own: Region, other: Region) -> bool:
-    return common_pixels(own, other) > LEAST_OVERLAP * own.area
+    return common_pixels(own, other) > MIN_OVERLAP * own.area
 
 
 def common_pixels(a: Region, b: Region) -> int:

@@ -31,7 +31,7 @@ from visup.percepts.motion.tracks.track_fitting import moves_like
 NEAR_STEPS = 4  # cells between tracks that touch
 APART_S = 1.5
 MERGE_VOTES = 3.0
-MOST_PARTS = 3
+MAX_PARTS = 3
 LIMB_SHARE = 0.5  # largest limb, as a share of its object's area
 SURROUNDED_SHARE = 0.75
 """Share of a track's surroundings that one other covers when it is a part of that."""
@@ -292,5 +292,5 @@ def merged(a: Track, b: Track) -> Track:
 
 def _parts(motions: tuple[PartMotion, ...]) -> tuple[PartMotion, ...]:
     """The best supported motions, few enough not to explain everything."""
-    keep = sorted(range(len(motions)), key=lambda i: -motions[i].support)[:MOST_PARTS]
+    keep = sorted(range(len(motions)), key=lambda i: -motions[i].support)[:MAX_PARTS]
     return tuple(motions[i] for i in sorted(keep))

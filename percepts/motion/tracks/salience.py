@@ -25,7 +25,7 @@ from visup.percepts.motion.layers.layer_discovery import median_motion
 from visup.percepts.motion.tracks.measurements import BaselineMotion, FrameMeasurements
 from visup.percepts.motion.tracks.track import Indices, Track
 
-LEAST_DISPLACEMENT = 1.0  # least displacement against the background, pixels: leaves reach less
+MIN_DISPLACEMENT = 1.0  # least displacement against the background, pixels: leaves reach less
 YOUNG_DISPLACEMENT = 4.0  # pixels, the same for a track too young to have swung back
 SWING_S = 0.4
 STRAIGHT_SHARE = 0.7  # net displacement as a share of path length
@@ -43,13 +43,13 @@ EARLY_DISPLACEMENT = 3.0
 """Pixels, least displacement of a track reported at once: further than leaves swing."""
 RING_STEPS = 5  # width of the surrounding ring, cells
 FEWEST_AROUND = 8
-MOST_BORDER = 0.2  # most share of the image border that an object may cover when first reported
+MAX_BORDER = 0.2  # most share of the image border that an object may cover when first reported
 LITTLE_BORDER = 0.04  # the same for one reported at once: parallax is greatest at the border
 FOOT_SHARE = 0.15  # height of a region's foot, as a share of its own
-LEAST_OWN = 0.25  # least motion of its own, pixels per frame: twice the sampling error
+MIN_OWN = 0.25  # least motion of its own, pixels per frame: twice the sampling error
 GROUND_TOLERANCE = 0.15
 """Share of the ground's motion that counts as none: the foot is not located to a pixel."""
-MOST_AHEAD = 0.4
+MAX_AHEAD = 0.4
 """How much faster than the background, in its direction, a near object at rest may move."""
 
 
@@ -264,7 +264,7 @@ def moves_like_standing(scene: FrameMeasurements, mine: NDArray[np.bool_]) -> bo
     x, y = scene.cells.centre[mine].astype(np.int64).T
     moved = -np.median(scene.flow[y, x], axis=0)
     ground = rest.matrix[:, 2]
-    return bool(np.hypot(*(moved - ground)) < LEAST_OWN + GROUND_TOLERANCE * np.hypot(*ground))
+    return bool(np.hypot(*(moved - ground)) < MIN_OWN + GROUND_TOLERANCE * np.hypot(*ground))
 
 
 def _misfit(m: BaselineMotion, local: Sequence[Affine], which: Indices) -> NDArray[np.float32]:
@@ -294,7 +294,7 @@ def is_salient(
     Returns:
         Whether it certainly moves independently.
     """
-    if border_share(t.share, scene.cells) > (LITTLE_BORDER if at_once else MOST_BORDER):
+    if border_share(t.share, scene.cells) > (LITTLE_BORDER if at_once else MAX_BORDER):
         return False
     travelled = float(np.hypot(*t.displacement))
     explained = min(t.background_fit.values(), default=0.0)
@@ -307,7 +307,7 @@ def is_salient(
         course = straight if straight_over_long is None else straight_over_long
         clear = explained < EARLY_EXPLAINED_SHARE / need and travelled >= need * EARLY_DISPLACEMENT
         return clear and course and not _outruns_background(t, scene)
-    least = LEAST_DISPLACEMENT if scene.time - t.initiated >= need * SWING_S else YOUNG_DISPLACEMENT
+    least = MIN_DISPLACEMENT if scene.time - t.initiated >= need * SWING_S else YOUNG_DISPLACEMENT
     # A track may be fed by leaf after leaf that happens to swing the same way.
     course = straight and straight_over_long is not False
     return explained < EXPLAINED_SHARE / need and travelled >= need * least and course
@@ -344,7 +344,7 @@ def _outruns_background(t: Track, scene: FrameMeasurements) -> bool:
     more = t.instant_velocity() * scene.seconds - ground
     along = float(more @ ground) / speed**2
     across = abs(float(more[0] * ground[1] - more[1] * ground[0])) / speed**2
-    return along > 0 and across < along + MOST_AHEAD
+    return along > 0 and across < along + MAX_AHEAD
 
 
 def _displacement_from_background(

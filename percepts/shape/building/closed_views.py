@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 CLOSING_RADIUS = 0.06
 """Radius of the disc that closes gaps, in square roots of the area."""
-LEAST_GAIN = 0.06
+MIN_GAIN = 0.06
 """A closed silhouette is stored if its area is larger by this share."""
 
 
@@ -42,4 +42,4 @@ def without_gaps(mask: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
     padded = np.pad(mask, radius + 1).astype(np.uint8)
     closed = cv2.morphologyEx(padded, cv2.MORPH_CLOSE, disc)[radius + 1 : -radius - 1]
     filled = np.asarray(closed[:, radius + 1 : -radius - 1], dtype=np.bool_)
-    return filled if np.count_nonzero(filled) >= (1 + LEAST_GAIN) * area else None
+    return filled if np.count_nonzero(filled) >= (1 + MIN_GAIN) * area else None

@@ -43,7 +43,7 @@ VIEWS = 32
 CLUSTERS = 8
 """Default number of exemplars of a folder of silhouettes."""
 
-MOST_CLUSTERED = 400
+MAX_CLUSTERED = 400
 """Most silhouettes to cluster; more are sampled evenly."""
 
 IMAGE_SUFFIXES = (".png", ".bmp", ".jpg", ".jpeg", ".pgm", ".tif", ".tiff", ".webp")
@@ -188,7 +188,7 @@ def silhouette_views(
             expected="pictures with an object of at least 24 pixels",
         )
     # All pairs are compared, so a long video is subsampled evenly.
-    indices = np.linspace(0, len(shapes) - 1, min(len(shapes), MOST_CLUSTERED)).round().astype(int)
+    indices = np.linspace(0, len(shapes) - 1, min(len(shapes), MAX_CLUSTERED)).round().astype(int)
     sample = [shapes[k] for k in indices]
     cut = [s for s in sample if s.cut]
     cut_count = round(clusters * len(cut) / len(sample))

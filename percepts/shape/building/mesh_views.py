@@ -20,7 +20,7 @@ from visup.agent.model.orientation import image_axes
 IMAGE_SIDE = 200
 """Pixels along the longer side of a rendered silhouette."""
 
-_MOST_SPREAD = 400
+_MAX_SPREAD = 400
 _STEPS = 60
 
 
@@ -88,7 +88,7 @@ def half_sphere_directions(count: int, seed: int = 0) -> NDArray[np.float64]:
     """
     lattice = sphere_directions(2 * count)[:count]
     # A large lattice is even enough, and each step would be slow.
-    spread = _repelled(lattice) if count <= _MOST_SPREAD else lattice
+    spread = _repelled(lattice) if count <= _MAX_SPREAD else lattice
     return spread if seed == 0 else np.asarray(spread @ _random_rotation(seed).T)
 
 

@@ -24,7 +24,7 @@ from visup.percepts.shape.database.file_reader import open_checked, read_content
 from visup.percepts.shape.index.view_records import Direction, InvalidRecordError, ModelView, decode
 from visup.percepts.shape.matching.shape_similarity import Shape
 
-MOST_CACHED = 4096
+MAX_CACHED = 4096
 """Most shapes cached in memory, about 20 kB each."""
 
 
@@ -159,7 +159,7 @@ class Shapes(Sequence[Shape]):
             cached = self._cache.get(number)
             if cached is None:
                 cached = self._cache[number] = self._read(number)
-                if len(self._cache) > MOST_CACHED:
+                if len(self._cache) > MAX_CACHED:
                     self._cache.popitem(last=False)
             else:
                 self._cache.move_to_end(number)

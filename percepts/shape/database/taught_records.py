@@ -22,9 +22,9 @@ from visup.percepts.shape.database.file_format import (
     damaged,
 )
 from visup.percepts.shape.index.view_records import InvalidRecordError
-from visup.percepts.taught.taught_view import LEAST_PIXELS, SCENE_WIDTH, TaughtView
+from visup.percepts.taught.taught_view import MIN_PIXELS, SCENE_WIDTH, TaughtView
 
-MOST_PIXELS = 1 << 25
+MAX_PIXELS = 1 << 25
 """Most pixels of a stored image: a small file may unpack to a huge image."""
 
 _COLUMNS = "name, x, y, width, height, image, mask, scene, crc"
@@ -60,10 +60,10 @@ def encoded(view: TaughtView) -> TaughtRow:
         *(cv2.imencode(".png", p)[1].tobytes() for p in (view.image, mask, view.scene)),
     )
     size = len(row.image) + len(row.mask) + len(row.scene)
-    if size > LARGEST_ROW_BYTES - (1 << 16) or view.mask.size > MOST_PIXELS:
+    if size > LARGEST_ROW_BYTES - (1 << 16) or view.mask.size > MAX_PIXELS:
         raise DatabaseError(
             f"the picture of '{name}' is too large to be stored ({size / 1e6:.0f} MB)",
-            expected=f"at most {LARGEST_ROW_BYTES / 1e6:.0f} MB and {MOST_PIXELS} pixels",
+            expected=f"at most {LARGEST_ROW_BYTES / 1e6:.0f} MB and {MAX_PIXELS} pixels",
             hint="show it in a picture of fewer pixels",
         )
     return row
@@ -100,7 +100,7 @@ def _decode(data: bytes, kind: int) -> NDArray[np.uint8]:
     if not data.startswith(_PNG_HEADER) or len(data) < 33:
         raise InvalidRecordError("a picture that is none")
     width, height = (int.from_bytes(data[a : a + 4], "big") for a in (16, 20))
-    if not 0 < width * height <= MOST_PIXELS:
+    if not 0 < width * height <= MAX_PIXELS:
         raise InvalidRecordError(f"a picture of {width} x {height} pixels")
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), kind)
@@ -120,7 +120,7 @@ def _check(
         (min(x, y) >= 0, "a place outside its picture"),
         (x + mask.shape[1] <= width, "a place outside its picture"),
         (y + mask.shape[0] <= height, "a place outside its picture"),
-        (np.count_nonzero(mask) >= LEAST_PIXELS, "nothing in its outline"),
+        (np.count_nonzero(mask) >= MIN_PIXELS, "nothing in its outline"),
         (scene.shape[1] <= SCENE_WIDTH, "a scene that is too wide"),
     ):
         if not valid:

@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 
 from visup.percepts.shape.index.outline_sketch import HEIGHTS, POINTS
 from visup.percepts.shape.matching.shape_similarity import Shape
-from visup.percepts.shape.shocks.shock_graph import MOST_NODES, PROFILE, ShockGraph, frozen_graph
+from visup.percepts.shape.shocks.shock_graph import MAX_NODES, PROFILE, ShockGraph, frozen_graph
 from visup.percepts.shape.shocks.skeletal_context import CONTEXT
 from visup.percepts.shape.shocks.topological_signature import LENGTH
 from visup.percepts.shape.silhouette.area_overlap import ANGLES, RINGS
 from visup.percepts.shape.silhouette.silhouette import SMOOTHING
 
-MOST_POINTS = 640
+MAX_POINTS = 640
 """Most points of a stored outline."""
 
 Records = NDArray[Any]
@@ -177,11 +177,11 @@ def decode(stored: ShapeBytes, view: np.void) -> Shape:
     Raises:
         InvalidRecordError: The bytes are not a valid shape of this view.
     """
-    nodes = records(stored.nodes, NODE, 2, MOST_NODES + 1, "nodes")
+    nodes = records(stored.nodes, NODE, 2, MAX_NODES + 1, "nodes")
     if nodes[0].tobytes() != view["root"].tobytes():
         raise InvalidRecordError("the root of another")
-    edges = records(stored.edges, EDGE, 1, 2 * (MOST_NODES + 1), "edges")
-    contour = records(stored.contour, POINT, 8, MOST_POINTS, "points of the outline")
+    edges = records(stored.edges, EDGE, 1, 2 * (MAX_NODES + 1), "edges")
+    contour = records(stored.contour, POINT, 8, MAX_POINTS, "points of the outline")
     check_nodes(nodes)
     # Parents precede children, so the graph has no cycle.
     if not bool(((edges[:, 0] >= 0) & (edges[:, 0] < edges[:, 1])).all()) or edges.max() >= len(

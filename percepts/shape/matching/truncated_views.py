@@ -33,7 +33,7 @@ BEARINGS = 32
 SHARES = (0.06, 0.11, 0.18, 0.28, 0.45)
 """Shares of a view's area that are cut off, one line each."""
 
-MOST_CACHED = 4096
+MAX_CACHED = 4096
 """Most views kept prepared."""
 
 _EDGES = np.concatenate([np.linspace(0.0, 1.2, 11), np.linspace(1.45, 2.95, 7)])
@@ -135,7 +135,7 @@ class CutIndex:
         self._shapes = shapes
         self._slots = np.full(len(shapes), -1, dtype=np.intp)
         self._used = 0
-        size = (min(len(shapes), MOST_CACHED), BEARINGS, len(SHARES))
+        size = (min(len(shapes), MAX_CACHED), BEARINGS, len(SHARES))
         self._coefficients = np.zeros((*size, _basis().shape[1]), dtype=np.float32)
         self._powers = np.zeros(size, dtype=np.float32)
         self._offsets = np.zeros(size, dtype=np.float32)
@@ -147,7 +147,7 @@ class CutIndex:
 
         Args:
             query: Its map, see `query_map`.
-            among: Numbers of the views to search, `MOST_CACHED` at most.
+            among: Numbers of the views to search, `MAX_CACHED` at most.
             most: How many to return.
             mirror: Whether mirror images count.
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from visup.agent.model.errors import DatabaseError
 
-MOST_FACES = 2500
+MAX_FACES = 2500
 """Meshes with more triangles are simplified, which is invisible at the size at which poses are fitted."""
 
 _CELLS = 40
@@ -49,14 +49,14 @@ def mesh_model(name: str, vertices: NDArray[np.floating], faces: NDArray[np.inte
         faces: (F, 3), numbers of vertices.
 
     Returns:
-        The mesh in its unit sphere; beyond `MOST_FACES` triangles, vertices within a cell of a coarse
+        The mesh in its unit sphere; beyond `MAX_FACES` triangles, vertices within a cell of a coarse
         grid are merged, which moves a surface by at most a fortieth of the diameter.
     """
     points = np.asarray(vertices, dtype=np.float64)
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
     radius = float(np.linalg.norm(points - centre, axis=1).max())
     unit, triangles = (points - centre) / radius, np.asarray(faces, dtype=np.int32)
-    if len(triangles) > MOST_FACES:
+    if len(triangles) > MAX_FACES:
         unit, triangles = _clustered(unit, triangles)
     return MeshModel(name, unit.astype(np.float32), np.ascontiguousarray(triangles), radius)
 

@@ -23,13 +23,13 @@ from visup.percepts.shape.refinement.region_image import RegionImage
 
 Floats = NDArray[np.float64]
 
-MOST_POINTS = 80
+MAX_POINTS = 80
 """Points followed at most."""
 
-LEAST_POINTS = 10
+MIN_POINTS = 10
 """Least number of points from which a rotation is estimated."""
 
-LEAST_INLIER_SHARE = 0.5
+MIN_INLIER_SHARE = 0.5
 """Least share of the tracked points that one rotation must explain; else the image shows something else."""
 
 INLIER_PX = 1.0
@@ -176,8 +176,8 @@ def surface_image(frame: Frame, region: Region) -> SurfaceImage | None:
     mask[top : top + h, left : left + w] = region.mask
     # On a plain background there is nothing else to track, and corners of the outline are most informative.
     inside = mask if _is_plain_around(mask, grey) else cv2.erode(mask, np.ones((5, 5), np.uint8))
-    points = cv2.goodFeaturesToTrack(grey, MOST_POINTS, _QUALITY, _APART_PX, mask=inside)
-    if points is None or len(points) < LEAST_POINTS:
+    points = cv2.goodFeaturesToTrack(grey, MAX_POINTS, _QUALITY, _APART_PX, mask=inside)
+    if points is None or len(points) < MIN_POINTS:
         return None
     return SurfaceImage(grey, np.asarray(points[:, 0], np.float32))
 
@@ -227,7 +227,7 @@ def rotation_since(positions: Floats, image_points: Floats, distance: float) -> 
         >>> Rotation.from_matrix(found).as_rotvec().round(3).tolist()
         [0.02, -0.03, 0.01]
     """
-    if len(positions) < LEAST_POINTS:
+    if len(positions) < MIN_POINTS:
         return None
     motion = np.zeros(6)
     motion[3:5] = np.median(image_points - _projected(positions, motion, distance), axis=0)
@@ -249,7 +249,7 @@ def rotation_since(positions: Floats, image_points: Floats, distance: float) -> 
             normal + 1e-9 * np.eye(6), flat.T @ (each * residuals.ravel())
         )
     explained = np.hypot(*(image_points - _projected(positions, motion, distance)).T) < INLIER_PX
-    if np.count_nonzero(explained) < max(LEAST_POINTS, LEAST_INLIER_SHARE * len(positions)):
+    if np.count_nonzero(explained) < max(MIN_POINTS, MIN_INLIER_SHARE * len(positions)):
         return None
     return np.asarray(Rotation.from_rotvec(motion[:3]).as_matrix(), np.float64)
 

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 PROFILE = 8
 """Radii sampled along each node."""
 
-MOST_NODES = 120
+MAX_NODES = 120
 """Most nodes; a silhouette with more significant parts loses its smallest ones."""
 
 POINT_LENGTH = 0.05
@@ -230,7 +230,7 @@ def _ordered(
 def _order(parts: list[_PlacedShock], links: list[tuple[int, int]]) -> list[int]:
     """Part numbers in topological order, longer first; the shortest are dropped when too many."""
     lengths = np.array([p.length for p in parts])
-    kept = set(np.argsort(-lengths, kind="stable")[:MOST_NODES].tolist())
+    kept = set(np.argsort(-lengths, kind="stable")[:MAX_NODES].tolist())
     parents_left = {p: {a for a, b in links if b == p and a in kept} for p in kept}
     order: list[int] = []
     # networkx's lexicographical topological sort gives the same order; for the 8 to 40 nodes of a silhouette

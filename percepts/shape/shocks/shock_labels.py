@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 TOLERANCE = 0.18
 """Share of the radius below which a change is ignored."""
 
-LEAST_SLOPE = 0.35
+MIN_SLOPE = 0.35
 """Change of the radius per length that counts on a branch too short to change by much."""
 
-LEAST_BEND = 1.5
+MIN_BEND = 1.5
 """Least length of a bend inside a longer branch, in radii."""
 
 
@@ -104,7 +104,7 @@ def _level_neck(
     level = radii <= radii[k] * (1 + 0.5 * tolerance)
     a = k - int(np.argmin(level[k::-1])) + 1 if not level[: k + 1].all() else 0
     b = k + int(np.argmin(level[k:])) - 1 if not level[k:].all() else len(radii) - 1
-    return (a, b) if along[b] - along[a] >= LEAST_BEND * radii[k] else (k, k)
+    return (a, b) if along[b] - along[a] >= MIN_BEND * radii[k] else (k, k)
 
 
 def turning_points(radii: NDArray[np.float64], tolerance: float) -> list[int]:
@@ -144,10 +144,10 @@ def _split_run(
 ) -> list[Shock]:
     """Split a monotonic run: one protrusion, one bend, or parts of both."""
     change, length = abs(radii[a] - radii[b]), along[b] - along[a]
-    if change <= tolerance * max(radii[a], radii[b]) and change <= LEAST_SLOPE * length:
+    if change <= tolerance * max(radii[a], radii[b]) and change <= MIN_SLOPE * length:
         return [Shock(ShockKind.BEND, a, b)]
     c, d = _longest_level(radii, along, a, b, tolerance)
-    if along[d] - along[c] < LEAST_BEND * radii[c : d + 1].mean():
+    if along[d] - along[c] < MIN_BEND * radii[c : d + 1].mean():
         return [Shock(ShockKind.PROTRUSION, a, b)]
     parts = [
         Shock(ShockKind.PROTRUSION, a, c),

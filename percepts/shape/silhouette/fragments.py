@@ -18,7 +18,7 @@ SUFFICIENT_SHARE = 0.98
 CLOSING_RADII = (0.015, 0.03, 0.06, 0.1)
 """Radii of the closing discs that are tried, in units of the square root of the area."""
 
-_MOST_ISLANDS = 2000
+_MAX_ISLANDS = 2000
 
 
 def join_fragments(mask: NDArray[np.uint8]) -> NDArray[np.bool_]:
@@ -38,7 +38,7 @@ def join_fragments(mask: NDArray[np.uint8]) -> NDArray[np.bool_]:
         (True, False, 502)
     """
     largest, share, islands = _largest(mask, mask)
-    if share >= SUFFICIENT_SHARE or not 1 < islands <= _MOST_ISLANDS:
+    if share >= SUFFICIENT_SHARE or not 1 < islands <= _MAX_ISLANDS:
         return largest
     side = float(np.count_nonzero(mask)) ** 0.5
     outside = _distance(1 - mask, int(np.ceil(CLOSING_RADII[-1] * side)) + 2)

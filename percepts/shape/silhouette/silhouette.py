@@ -29,15 +29,15 @@ RESOLUTION = 80
 SPACING = 0.04
 """Distance between neighbouring points of the outline, units."""
 
-LEAST_AREA = 24
+MIN_AREA = 24
 """Fewest pixels of a mask with a meaningful shape."""
 
 SIDES = ("right", "bottom", "left", "top")
 """Sides of an image."""
 
 _BEARINGS = {"right": 0.0, "bottom": 0.5 * np.pi, "left": np.pi, "top": -0.5 * np.pi}
-_MOST_PIXELS = 1 << 21
-_MOST_EXTENT = 1400
+_MAX_PIXELS = 1 << 21
+_MAX_EXTENT = 1400
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,7 +85,7 @@ def normalise(
 
     Returns:
         The silhouette of the largest part with the islands near it (`fragments.py`), holes filled, or
-        None when it has fewer than `LEAST_AREA` pixels.
+        None when it has fewer than `MIN_AREA` pixels.
 
     Raises:
         SettingsError: The mask is not a binary image.
@@ -102,7 +102,7 @@ def normalise(
     part, corner, shrink = cropped
     solid, inset = _solid(part)
     area = float(np.count_nonzero(solid))
-    if area < LEAST_AREA:
+    if area < MIN_AREA:
         return None
     field, zoom, pad = _smooth_field(solid, area, smoothing)
     outline = _longest_outline(field)
@@ -149,7 +149,7 @@ def _crop(mask: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], tuple[int, int], 
     x0, x1 = int(columns.argmax()), mask.shape[1] - int(columns[::-1].argmax())
     y0, y1 = int(rows.argmax()), mask.shape[0] - int(rows[::-1].argmax())
     part = (mask[y0:y1, x0:x1] != 0).astype(np.uint8)
-    shrink = min(1.0, (_MOST_PIXELS / part.size) ** 0.5)
+    shrink = min(1.0, (_MAX_PIXELS / part.size) ** 0.5)
     if shrink < 1.0:
         size = (max(1, int(part.shape[1] * shrink)), max(1, int(part.shape[0] * shrink)))
         part = (cv2.resize(part * np.uint8(255), size, interpolation=cv2.INTER_AREA) > 127).astype(
@@ -172,7 +172,7 @@ def _smooth_field(
     solid: NDArray[np.uint8], area: float, smoothing: float
 ) -> tuple[NDArray[np.float32], float, int]:
     """The silhouette at working resolution, blurred: the outline is where the field is one half."""
-    zoom = min(RESOLUTION / area**0.5, _MOST_EXTENT / max(solid.shape))
+    zoom = min(RESOLUTION / area**0.5, _MAX_EXTENT / max(solid.shape))
     sigma = smoothing * zoom * area**0.5
     margin = int(np.ceil(3 * sigma / zoom)) + 2
     padded = np.pad(solid, margin).astype(np.float32)

@@ -6,7 +6,7 @@ import pytest
 
 from tests.agent.scripted import Scripted, frames
 from visup.agent import Contract
-from visup.agent.contract.contract import CONTRACT_VERSION, MOST_HISTORY
+from visup.agent.contract.contract import CONTRACT_VERSION, MAX_HISTORY
 from visup.agent.execution.pipeline import ordered_slots
 from visup.agent.model.errors import BehaviourError
 
@@ -27,7 +27,7 @@ from visup.agent.model.errors import BehaviourError
         ({"every_s": "1"}, "`every_s` is '1'"),
         ({"cost_ms": 0}, "a number above 0, or None"),
         ({"memory_mb": float("inf")}, "`memory_mb` is inf"),
-        ({"history": MOST_HISTORY + 1}, f"0 to {MOST_HISTORY}"),
+        ({"history": MAX_HISTORY + 1}, f"0 to {MAX_HISTORY}"),
         ({"history": 1.5}, "`history` is 1.5"),
         ({"most_percepts": 0}, "1 to 1000000"),
         ({"deterministic": 1}, "True or False"),

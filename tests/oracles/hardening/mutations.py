@@ -6,7 +6,7 @@ import random
 import re
 from collections.abc import Callable, Sequence
 
-MOST_BYTES = 400_000
+MAX_BYTES = 400_000
 NUMBERS = (b"0", b"-1", b"1e999", b"nan", b"99999999999999999999", b"-2147483649", b"1" * 400, b"")
 BYTES = (0, 1, 0x7F, 0x80, 0xFE, 0xFF)
 
@@ -51,7 +51,7 @@ def _move(data: bytearray, rng: random.Random) -> None:
 
 
 def _number(data: bytearray, rng: random.Random) -> None:
-    found = list(re.finditer(rb"\d+(?:\.\d+)?", bytes(data[:MOST_BYTES])))
+    found = list(re.finditer(rb"\d+(?:\.\d+)?", bytes(data[:MAX_BYTES])))
     if found:
         where = rng.choice(found)
         data[where.start() : where.end()] = rng.choice(NUMBERS)
@@ -59,7 +59,7 @@ def _number(data: bytearray, rng: random.Random) -> None:
 
 def _word(data: bytearray, rng: random.Random) -> None:
     """Put one word of the file in the place of another."""
-    found = list(re.finditer(rb"[A-Za-z_]+|[^\w\s]", bytes(data[:MOST_BYTES])))
+    found = list(re.finditer(rb"[A-Za-z_]+|[^\w\s]", bytes(data[:MAX_BYTES])))
     if len(found) > 1:
         where, other = rng.choice(found), rng.choice(found).group()
         data[where.start() : where.end()] = other
@@ -81,4 +81,4 @@ def mutated(seeds: Sequence[bytes], rng: random.Random) -> bytes:
     for _ in range(rng.choice((1, 1, 2, 5))):
         if data:
             rng.choice(DAMAGES)(data, rng)
-    return bytes(data[: 4 * MOST_BYTES])
+    return bytes(data[: 4 * MAX_BYTES])

@@ -31,7 +31,7 @@ from visup.tasks.automaton.stage_hmm import ActionStatus, StageHmm
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.grammar.parser import read
 
-MOST_HISTORIES = 4_000
+MAX_HISTORIES = 4_000
 LONGEST = 6
 TOLERANCE = 1e-6
 FRAME_S = 0.1
@@ -85,7 +85,7 @@ def _compare(rng: random.Random, seed: int, result: Agreement) -> None:
     recogniser = hidden_filter(read(recognition_tasks.text_of(rules)), model, most=10**9, least=0.0)
     belief = recogniser.start()
     result.grammars += 1
-    for (dt, seen), truth in zip(stream, oracle.told(stream, MOST_HISTORIES), strict=False):
+    for (dt, seen), truth in zip(stream, oracle.told(stream, MAX_HISTORIES), strict=False):
         belief = recogniser.step(belief, evidence(seen), dt)
         told = {(stage, str(s)): p for (stage, s), p in recogniser.stages(belief).items()}
         differ = (abs(told.get(k, 0.0) - truth.get(k, 0.0)) for k in {*told, *truth})

@@ -34,7 +34,7 @@ from visup.percepts.shape.silhouette.silhouette import normalise
 FILES = 2000
 ODD_MASKS = 2000
 
-MOST_S = 1.0
+MAX_S = 1.0
 """Seconds that a trial may take."""
 
 EVERY_LARGE = 40
@@ -62,7 +62,7 @@ class CorruptionOutcome:
     @property
     def failed(self) -> bool:
         """Whether it is neither an answer, nor a refusal, nor in time."""
-        return self.what not in ("refused", "answered", "nothing") or self.seconds > MOST_S
+        return self.what not in ("refused", "answered", "nothing") or self.seconds > MAX_S
 
 
 def evaluate_robustness(

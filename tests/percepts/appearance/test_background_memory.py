@@ -22,7 +22,7 @@ from tests.percepts.appearance.scenes import (
 from visup.agent import Frame, Observation, Region
 from visup.percepts.appearance.background.background_memory import (
     FIRST_INTERVAL_S,
-    MOST_FRAMES,
+    MAX_FRAMES,
     REDUCTION,
     BackgroundMemory,
     has_changed,
@@ -151,7 +151,7 @@ def test_the_first_picture_is_kept_and_few_are(count: int) -> None:
         time = k * FIRST_INTERVAL_S
         where = (20, 60) if k == 0 else (150, 60)
         memory.update(prepare_scene(image, time), {"tool": blob(where)})
-    assert len(memory.frames) <= MOST_FRAMES
+    assert len(memory.frames) <= MAX_FRAMES
     assert memory.frames[0].covered["tool"][80 // REDUCTION, 30 // REDUCTION]
 
 

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from visup.percepts.detections.box_tracker import LEAST_OVERLAP, MOST_MISSED_FRAMES, MultiBoxTracker
+from visup.percepts.detections.box_tracker import MAX_MISSED_FRAMES, MIN_OVERLAP, MultiBoxTracker
 from visup.percepts.detections.boxes import Box, Detection, intersection_over_union
 
 BOXES = st.tuples(st.floats(0, 80), st.floats(0, 80), st.floats(5, 40), st.floats(5, 40))
@@ -63,7 +63,7 @@ def test_numbers_go_on_so_that_boxes_overlap_the_most_in_all(
 
     def shared(i: int, j: int) -> float:
         both = intersection_over_union(before[i], now[j])
-        return both if both >= LEAST_OVERLAP else 0.0
+        return both if both >= MIN_OVERLAP else 0.0
 
     best = max(
         sum(shared(i, j) for i, j in enumerate(order) if j is not None)
@@ -131,8 +131,8 @@ def test_who_was_away_for_long_is_somebody_new() -> None:
     numbering = MultiBoxTracker()
     box: list[tuple[Box, str | None]] = [((5.0, 5.0, 10.0, 10.0), "cup")]
     assert numbering.number(0, found(box))[0].track == 1
-    assert numbering.number(MOST_MISSED_FRAMES + 1, found(box))[0].track == 1
-    assert numbering.number(2 * MOST_MISSED_FRAMES + 3, found(box))[0].track == 2
+    assert numbering.number(MAX_MISSED_FRAMES + 1, found(box))[0].track == 1
+    assert numbering.number(2 * MAX_MISSED_FRAMES + 3, found(box))[0].track == 2
 
 
 def test_numbers_of_a_tracker_are_kept() -> None:

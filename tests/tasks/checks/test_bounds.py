@@ -13,7 +13,7 @@ from visup.agent import Mind, Observation
 from visup.agent.model.errors import VisupError
 from visup.rules.language.parser import load_rules, parse_rules
 from visup.tasks import load_tasks, parse_task
-from visup.tasks.checks.bounds import DEEPEST_STAGES, MOST_FAULTS
+from visup.tasks.checks.bounds import DEEPEST_STAGES, MAX_FAULTS
 from visup.tasks.supervision.supervise import task_reasoner
 from visup.tasks.tools.outline import outline
 
@@ -60,7 +60,7 @@ def test_many_mistakes_give_a_bounded_report() -> None:
     text = "<t> ::= " + "\n".join(f"convergin{n}(a, b)" for n in range(5000))
     with pytest.raises(VisupError) as told:
         parse_task(text)
-    assert len(getattr(told.value, "errors", (1,))) <= MOST_FAULTS
+    assert len(getattr(told.value, "errors", (1,))) <= MAX_FAULTS
     assert len(str(told.value)) < 100_000
 
 

@@ -17,7 +17,7 @@ from visup.agent.model.errors import ErrorGroup, SourceLocation, TaskError
 from visup.rules.language.diagnostics import Diagnostic
 from visup.tasks import load_task, parse_task, shipped_tasks
 from visup.tasks.actions.actions import ActionDefinition
-from visup.tasks.checks.bounds import MOST_FAULTS
+from visup.tasks.checks.bounds import MAX_FAULTS
 from visup.tasks.checks.diagnose import diagnose
 from visup.tasks.checks.load import read_text
 from visup.tasks.diagnostics.codes import CODES
@@ -148,7 +148,7 @@ def test_long_files_are_parsed_quickly(name: str, text: str) -> None:
     start = time.process_time()
     _, faults = diagnose(text)
     assert time.process_time() - start < 2.5  # the bar for 10,000
-    assert len(faults) == {"mistaken": MOST_FAULTS, "chain": 1}.get(name, 0)  # too deep a chain
+    assert len(faults) == {"mistaken": MAX_FAULTS, "chain": 1}.get(name, 0)  # too deep a chain
 
 
 def test_a_typical_file_is_parsed_immediately() -> None:

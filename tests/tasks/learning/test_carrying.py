@@ -16,7 +16,7 @@ from visup.tasks.learning.carrying import with_carrying
 from visup.tasks.learning.induction import learn_task
 from visup.tasks.learning.meetings import meetings_of, pairs_by_weight
 from visup.tasks.learning.order import CarryingStage
-from visup.tasks.learning.places import MOST_SHARED, FinalPlace, places_of
+from visup.tasks.learning.places import MAX_SHARED, FinalPlace, places_of
 from visup.tasks.learning.relevance import CourseEvent
 from visup.tasks.learning.rests import final_rest_of
 from visup.tasks.learning.traces import ActionInterval, RunTrace, Span, trace_of
@@ -233,7 +233,7 @@ def test_outlines_that_barely_touch_yield_no_final_place() -> None:
 
 def test_the_required_share_is_capped() -> None:
     contact = ("touching", PLACED)
-    within, beside = (FinalPlace(contact, (contact, 0), s) for s in (1.0, MOST_SHARED))
+    within, beside = (FinalPlace(contact, (contact, 0), s) for s in (1.0, MAX_SHARED))
     assert within.least == beside.least == 42
 
 

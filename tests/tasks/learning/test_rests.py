@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from visup.tasks.checks.load import parse_task
 from visup.tasks.learning.induction import learn_task
 from visup.tasks.learning.relevance import relevant_events
-from visup.tasks.learning.rests import LEAST_ALLOWED, REST, SPEED_MARGIN, resting_actors
+from visup.tasks.learning.rests import MIN_ALLOWED, REST, SPEED_MARGIN, resting_actors
 from visup.tasks.learning.traces import SUSTAINED_S, ActionInterval, RunTrace, _sustained_speed
 
 DIAGONAL = 600.0
@@ -35,7 +35,7 @@ def test_a_slow_actor_is_at_rest_and_its_limit_exceeds_the_observed_speed(
     for name, seen in zip(("table", "arm"), zip(*speeds, strict=True), strict=True):
         assert (name in found) == (max(seen) <= REST * DIAGONAL)
         if name in found:
-            assert found[name].allowed >= max(LEAST_ALLOWED * DIAGONAL, SPEED_MARGIN * max(seen))
+            assert found[name].allowed >= max(MIN_ALLOWED * DIAGONAL, SPEED_MARGIN * max(seen))
     assert "lid" not in found  # nobody saw it in every run
 
 

@@ -12,7 +12,7 @@ from tests.tasks.scripted import RelationSpan, Script, ScriptedRun, mind_at, pla
 from visup.agent import Mind, Observation, Status, Truth, Verdict
 from visup.tasks import parse_task
 from visup.tasks.supervision.supervise import finish, task_reasoner
-from visup.tasks.verification.pauses import MOST_SPANS, PauseRecord
+from visup.tasks.verification.pauses import MAX_SPANS, PauseRecord
 
 ARM, PART, TRAY, GUARD = 1, 2, 3, 4
 NAMES = {ARM: {"arm": 0.9}, PART: {"part": 0.9}, TRAY: {"tray": 0.9}, GUARD: {"guard": 0.9}}
@@ -228,8 +228,8 @@ def test_the_record_of_many_pauses_is_bounded_and_exact() -> None:
     record = PauseRecord()
     (relation,) = [r for r in mind_at(script([paused_for(0.0, 1e9)]), 1.0, 0, Mind()).relations
                    if set(r.objects) == {ARM, GUARD} and r.name == "touching"]  # fmt: skip
-    for k in range(4 * MOST_SPANS):
+    for k in range(4 * MAX_SPANS):
         observed = relation if k % 2 else replace(relation, truth=Truth.FALSE)
         record = record.noted([condition], lambda _, s=observed: s, float(k), k + 1.0, 2.0)  # type: ignore[misc]
-    assert len(record.pauses[0].spans) == MOST_SPANS
-    assert record.elapsed([condition], 0.0, 4.0 * MOST_SPANS) == 2.0 * MOST_SPANS
+    assert len(record.pauses[0].spans) == MAX_SPANS
+    assert record.elapsed([condition], 0.0, 4.0 * MAX_SPANS) == 2.0 * MAX_SPANS

@@ -12,7 +12,7 @@ from visup.agent import Depth, Hypothesis, Observation, Percept, Region
 from visup.agent.model.fast_replace import replace
 from visup.rules.geometry.regions import shared_pixels
 
-LEAST_OVERLAP = 0.5
+MIN_OVERLAP = 0.5
 """Least IoU, over all frames with both regions, at which they are the same."""
 
 
@@ -42,7 +42,7 @@ class RegionMatcher:
         found: dict[int, int] = {}
         for old, new in best:
             is_free = new not in found and old not in found.values()
-            if is_free and overlaps[old, new] >= LEAST_OVERLAP:
+            if is_free and overlaps[old, new] >= MIN_OVERLAP:
                 found[new] = old
         return found
 

@@ -20,7 +20,7 @@ have converged differ by a tenth of that; those that have not, by two to ten tim
 ALIKE_S = 1.0
 """How long they must agree, seconds."""
 STEP_S = 5.0
-MOST_S = 30.0
+MAX_S = 30.0
 """A chunk is continued in steps of the one, at most for the other, seconds: in some scenes two never
 agree."""
 
@@ -68,7 +68,7 @@ def _part(before: Recording, chunk: Recording, extend: Extend) -> Part | None:
     if ends is None or ended is None:  # the video was shorter than its header says
         return None
     pairs = _same_frames(before, chunk)
-    step, attempts_left = max(1, round(STEP_S * _rate(pairs))), int(MOST_S / STEP_S)
+    step, attempts_left = max(1, round(STEP_S * _rate(pairs))), int(MAX_S / STEP_S)
     while pairs and not _alike_at_the_end(pairs):
         if pairs[-1][1].frame_index >= ends[1]:
             return None

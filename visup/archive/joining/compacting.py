@@ -18,7 +18,7 @@ from visup.agent.model.errors import OutputError
 from visup.archive.extra import imported
 from visup.archive.joining.manifest import (
     FOLDER,
-    MOST_RUNS,
+    MAX_RUNS,
     Manifest,
     Partition,
     partition_name,
@@ -31,7 +31,7 @@ from visup.archive.schema import TABLES
 if TYPE_CHECKING:
     import pyarrow as pa
 
-MOST_ROWS = 2_000_000
+MAX_ROWS = 2_000_000
 """Rows of relations in a partition, unless a single run has more; bounds the memory of joining to 2 GB."""
 GRACE_S = 600.0
 """How long replaced files are kept, seconds; longer than a query takes."""
@@ -98,7 +98,7 @@ def _groups(lake: Lake, unjoined: Sequence[str]) -> Iterator[list[_Unit]]:
     group: list[_Unit] = []
     for unit in _units(lake, unjoined):
         runs = sum(len(u.runs) for u in group) + len(unit.runs)
-        if group and (runs > MOST_RUNS or sum(u.rows for u in group) + unit.rows > MOST_ROWS):
+        if group and (runs > MAX_RUNS or sum(u.rows for u in group) + unit.rows > MAX_ROWS):
             yield group
             group = []
         group.append(unit)
@@ -109,7 +109,7 @@ def _groups(lake: Lake, unjoined: Sequence[str]) -> Iterator[list[_Unit]]:
 def _units(lake: Lake, unjoined: Sequence[str]) -> Iterator[_Unit]:
     parquet = imported("pyarrow.parquet")
     for part in read_manifest(lake.path).partitions:
-        if len(part.runs) <= MOST_RUNS // 2 and part.rows <= MOST_ROWS // 2:
+        if len(part.runs) <= MAX_RUNS // 2 and part.rows <= MAX_ROWS // 2:
             yield _Unit(part.runs, part.rows, part)
     for run in unjoined:
         file = lake.table_file("relations", run)

@@ -19,7 +19,7 @@ from visup.agent.storage.atomic import write_atomically
 MANIFEST = "joined.json"
 FOLDER = "joined"
 VERSION = 1
-MOST_RUNS = 2_000
+MAX_RUNS = 2_000
 """Runs in a partition, at most."""
 
 
@@ -45,7 +45,7 @@ class Partition:
 
     def run_number(self, place: int) -> int:
         """The number of a run in the index, by its position in `runs`."""
-        return self.number * MOST_RUNS + place
+        return self.number * MAX_RUNS + place
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from visup.archive.extra import imported
 from visup.archive.joining.manifest import (
     FOLDER,
-    MOST_RUNS,
+    MAX_RUNS,
     Manifest,
     Partition,
     partition_name,
@@ -77,9 +77,9 @@ def multiply_lake(
     lake = Lake.create(folder)
     partitions: list[Partition] = []
     count = 0
-    for number, first in enumerate(range(0, runs, MOST_RUNS)):
+    for number, first in enumerate(range(0, runs, MAX_RUNS)):
         progress(f"making run {first} of {runs}")
-        size = min(MOST_RUNS, runs - first)
+        size = min(MAX_RUNS, runs - first)
         tables = _sample_copies(base, size, rows / runs, rng)
         keys = tuple(sorted(tables["runs"]["run"].to_pylist()))
         partition = Partition(

@@ -17,7 +17,7 @@ from visup.percepts.motion.outlines.region_outline import describe_mask
 from visup.percepts.motion.segmenter import MotionSegmenter
 from visup.percepts.motion.static_camera._slow_motion_jit import closing
 from visup.percepts.motion.static_camera.slow_motion import (
-    LEAST_THICKNESS,
+    MIN_THICKNESS,
     NEVER_HIDDEN_S,
     SPANS_S,
     UNCOVERED_S,
@@ -163,9 +163,7 @@ def test_what_moves_farther_than_a_part_is_thick_shows_itself(
 ) -> None:
     velocity = (speed * float(np.cos(way)), speed * float(np.sin(way)))
     assert is_nearly_still((0.0, 0.0), scale)
-    assert (
-        is_nearly_still(velocity, scale) or speed * scale * max(SPANS_S) > LEAST_THICKNESS * 0.999
-    )
+    assert is_nearly_still(velocity, scale) or speed * scale * max(SPANS_S) > MIN_THICKNESS * 0.999
     assert is_nearly_still(velocity, scale / 2) or not is_nearly_still(velocity, scale)
 
 

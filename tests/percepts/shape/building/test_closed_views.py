@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from visup.percepts.shape.building.closed_views import CLOSING_RADIUS, LEAST_GAIN, without_gaps
+from visup.percepts.shape.building.closed_views import CLOSING_RADIUS, MIN_GAIN, without_gaps
 from visup.percepts.shape.matching.shape_similarity import compare_shapes, shape_of
 from visup.percepts.shape.silhouette.silhouette import normalise
 
@@ -30,7 +30,7 @@ def test_closing_removes_nothing_and_small_gains_are_dropped(seed: int) -> None:
     closed = without_gaps(mask)
     if closed is not None:
         assert (closed | ~mask).all()
-        assert closed.sum() >= (1 + LEAST_GAIN) * mask.sum()
+        assert closed.sum() >= (1 + MIN_GAIN) * mask.sum()
 
 
 @pytest.mark.parametrize("gap", [4, 8])

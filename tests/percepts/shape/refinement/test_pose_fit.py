@@ -15,7 +15,7 @@ from visup.agent.model.errors import DatabaseError
 from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.percepts.shape.refinement._pose_fit_jit import fit_of, start_place
 from visup.percepts.shape.refinement.mesh_model import (
-    MOST_FACES,
+    MAX_FACES,
     MeshModel,
     mesh_bytes,
     mesh_model,
@@ -106,7 +106,7 @@ def test_a_large_mesh_is_simplified_and_keeps_its_size() -> None:
     assert len(model.faces) <= 3000
     assert model.radius == pytest.approx(3.0, rel=0.05)
     assert abs(np.linalg.norm(model.vertices, axis=1) - 1.0).max() < 0.08
-    assert MOST_FACES < 3000
+    assert MAX_FACES < 3000
 
 
 def test_stored_meshes_round_trip() -> None:

@@ -23,7 +23,7 @@ from visup.rules.language.parser import parse_rules
 from visup.tasks.checks.diagnose import diagnose
 
 ROOT = Path(__file__).parents[4]
-MOST_FIXES = 6
+MAX_FIXES = 6
 LONGEST = 1500
 """Characters of a good text; longer ones take long and hold the same sentences."""
 _BLOCK = re.compile(r"^```\w*\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -84,7 +84,7 @@ def outcome_of(mutation: Mutation, of_task: bool) -> HintOutcome | None:
         return None
     complete = all("^" in t.text and (t.expected or t.hint) for t in found)
     text = mutation.text
-    for _ in range(MOST_FIXES):
+    for _ in range(MAX_FIXES):
         fix = next(fixes(text, found), None)
         if fix is None:
             break
