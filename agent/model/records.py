@@ -187,6 +187,12 @@ class CameraMotion:
         x, y, turn = at[0] - c, at[1] - f, a * e - b * d
         return at[0] - (e * x - b * y) / turn, at[1] - (a * y - d * x) / turn
 
+    @property
+    def magnification(self) -> float:
+        """Factor by which areas in the image have grown since the last frame; 1 without zoom."""
+        (a, b, _), (d, e, _) = self.motion.tolist()
+        return float(a * e - b * d)
+
 
 @dataclass(frozen=True, slots=True)
 class Health:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from math import exp, hypot, sqrt
 from types import MappingProxyType
 
-from visup.agent import Mind, Region
+from visup.agent import CameraMotion, Mind, Region
 from visup.agent.model.fast_replace import replace
 from visup.agent.model.memory import MemoryKey
 from visup.rules.geometry.regions import Box, box_intersection, expanded, shared_pixels, shifted
@@ -25,6 +25,9 @@ square root of its area."""
 
 MIN_SIGHTINGS = 3
 """Fewest sightings from which an approach is measured."""
+
+MIN_ZOOM = 0.001
+"""Least magnification of a frame that counts as zoom: errors of the estimate must not add up."""
 
 TimedCentroid = tuple[float, float, float]
 """(time, x, y) of a centroid: seconds, pixels."""
@@ -183,6 +186,19 @@ def update_track(
         reference_area=reference,
         visible_share=visible,
     )
+
+
+def magnified(
+    tracks: Mapping[int, ObjectTrack], camera: CameraMotion | None
+) -> dict[int, ObjectTrack]:
+    """The tracks with reference areas that follow the zoom of the camera.
+
+    Without it, objects of which others may hide a part would seem to be hidden as the camera zooms out.
+    """
+    by = 1.0 if camera is None else camera.magnification
+    if abs(by - 1.0) < MIN_ZOOM:
+        return dict(tracks)
+    return {i: replace(t, reference_area=t.reference_area * by) for i, t in tracks.items()}
 
 
 def predicted_box(track: ObjectTrack, now: float) -> Box:

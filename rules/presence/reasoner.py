@@ -20,6 +20,7 @@ from visup.rules.presence.merging import merge
 from visup.rules.presence.object_tracks import (
     TRACKS,
     PresenceMemory,
+    magnified,
     new_track,
     presence_memory,
     update_track,
@@ -73,6 +74,7 @@ class PresenceReasoner(ExplainableReasoner):
     ) -> StepContext:
         old = presence_memory(mind)
         known = {i: t for i, t in old.tracks.items() if i in mind.objects}
+        known = magnified(known, next(iter(observation.of("camera")), None))
         fragments = mind.recall(FRAGMENTS)
         start = observation.time if old.start is None else old.start
         return StepContext(mind, observation, known, fragments, self.settings, start, log)

@@ -17,6 +17,7 @@ from visup.tasks.supervision.open_transitions import (
     OpenTransition,
     earliest_end,
     goes_on,
+    met_since,
     missed,
 )
 from visup.tasks.supervision.sentences import lasted, outcome
@@ -222,7 +223,11 @@ class Advance:
 
     def _skipped(self, transition: OpenTransition) -> float:
         """Probability of completing the steps of a transition in their current state."""
-        return math.prod(self._passed_over(x) for x in transition.left)
+        entered, seen = transition.entered, self.observe
+        met = (met_since(x, entered, seen) for x in transition.left)
+        return math.prod(
+            1.0 if m else self._passed_over(x) for m, x in zip(met, transition.left, strict=True)
+        )
 
     def _passed_over(self, leaf: Leaf[StepMonitor]) -> float:
         # An action that held, without a required duration, is over as soon as the next is observed.

@@ -16,10 +16,14 @@ from visup.tasks.automaton.derivatives import begin, derivatives, enter
 from visup.tasks.automaton.states import Leaf, State, TaskStep, leaves
 from visup.tasks.grammar.nodes import Actors, Deadline, Task, Timed, walk
 from visup.tasks.verification.observation import ActionObservation
+from visup.tasks.verification.step_model import Observe
 from visup.tasks.verification.step_monitor import BAD, StepMonitor, entered
 
 FIRST_LOOK_S = 0.5
 """Time after the first frame within which relations that hold from the start are recognised, seconds."""
+
+MEETINGS = frozenset({"touching", "in_contact", "on", "coupled"})
+"""Relations of which the first means that two bodies which were apart have met."""
 
 Target = tuple[Transition, tuple[TaskStep, ...], State[int] | None]
 """A transition, the steps that it begins, and its target state; None at the end."""
@@ -101,6 +105,20 @@ def earliest_end(left: Leaf[StepMonitor]) -> float:
     if left.step.hold_s is not None and monitor.fulfilled_at is not None:
         return monitor.fulfilled_at
     return monitor.entered if monitor.begun is None else monitor.begun
+
+
+def met_since(left: Leaf[StepMonitor], entered: tuple[TaskStep, ...], observe: Observe) -> bool:
+    """Whether an approach is completed because the two have met since it began.
+
+    However little was seen of it: what is carried along an arc hardly comes nearer until it is put down.
+    """
+    if left.step.action != "converging":
+        return False
+    mine = set(left.step.actors)
+    held = (observe(s).held_by for s in entered if set(s.actors) == mine)
+    return any(
+        h is not None and h.name in MEETINGS and h.since > left.payload.entered for h in held
+    )
 
 
 def missed(monitor: StepMonitor, seen: ActionObservation, since: float, now: float) -> StepMonitor:
