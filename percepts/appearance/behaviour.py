@@ -134,12 +134,12 @@ class AppearanceBehaviour:
 
     def _outline(self, track: TaughtObjectTrack, scene: Scene) -> RegionOutline | None:
         """The visible outline of an object; redrawn only when it has changed."""
-        known = self._drawn.get(track.name)
+        known = self._drawn.get(track.key)
         if track.visible is None:
             return None
         if known is None or known[0] is not track.visible:
             known = track.visible, object_outline(track.visible, scene)
-            self._drawn[track.name] = known
+            self._drawn[track.key] = known
         return known[1]
 
     def _id_for(self, blob: Blob, moving: Sequence[Region], scene: Scene) -> int:

@@ -99,7 +99,7 @@ def _track_at_rest(
     assert pose is not None
     assert appearance is not None
     assert rest is not None
-    same = motion.same[track.name]
+    same = motion.same[track.key]
     unchanged_share = float(np.mean(same[rest.blob.mask]))
     if np.mean(same) > UNCHANGED_SHARE:
         return with_observation(
@@ -163,7 +163,7 @@ def _redetect_hidden(track: TaughtObjectTrack, motion: FrameMotion) -> TaughtObj
     assert track.pose is not None
     scene, appearance, pose = motion.scene, track.appearance, track.pose.moved(motion.camera)
     if track.rest is not None and motion.static:
-        same = motion.same[track.name]
+        same = motion.same[track.key]
         if np.mean(same[track.rest.blob.mask]) > UNCOVERED_SHARE:
             return with_observation(replace(track, state=TrackState.RESTING), scene.time, pose)
     elif track.rest is not None:

@@ -61,6 +61,7 @@ class TaughtObjectTrack:
         first_seen: Time of the first observation, seconds.
         confirmed: Whether it has clearly matched a taught view.
         compared_at: Time of the last search of the whole image for it, seconds.
+        instance: Number of the instance, from 1: several objects may look as taught (`instances.py`).
     """
 
     name: str
@@ -79,3 +80,9 @@ class TaughtObjectTrack:
     first_seen: float = 0.0
     confirmed: bool = False
     compared_at: float = -np.inf
+    instance: int = 1
+
+    @property
+    def key(self) -> str:
+        """Its name among all tracks: the name as taught, and the number of a further instance."""
+        return self.name if self.instance == 1 else f"{self.name} #{self.instance}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -30,6 +30,7 @@ from visup.percepts.appearance.tracking.adaptation import (
     relearn_appearance,
 )
 from visup.percepts.appearance.tracking.drift_correction import correct_drift
+from visup.percepts.appearance.tracking.instances import further_instances
 from visup.percepts.appearance.tracking.look_alikes import look_alikes, resolve_look_alike
 from visup.percepts.appearance.tracking.redetection import (
     SURE,
@@ -38,7 +39,6 @@ from visup.percepts.appearance.tracking.redetection import (
     candidates,
     candidates_at_bodies,
     candidates_by_colour,
-    footprint,
     is_unique_by_colour,
 )
 from visup.percepts.appearance.tracking.segmentation import (
@@ -56,6 +56,11 @@ from visup.percepts.appearance.tracking.short_term_tracking import (
     with_observation,
 )
 from visup.percepts.appearance.tracking.track import IN_VIEW, TaughtObjectTrack, TrackState
+from visup.percepts.appearance.tracking.track_pixels import (
+    object_mask,
+    occupied_blobs,
+    visible_pixels,
+)
 
 Mask = NDArray[np.bool_]
 
@@ -73,7 +78,7 @@ class TaughtObjectTracker:
 
     Attributes:
         views: As given.
-        tracks: One for each name, in the order of teaching.
+        tracks: One for each name, in the order of teaching, then those of further instances.
         scene: The last frame.
     """
 
@@ -128,13 +133,13 @@ class TaughtObjectTracker:
             bodies: Segmented moving bodies of the frame; not needed unless `seeks_new`.
 
         Returns:
-            One track for each name, in the order of teaching.
+            The tracks; see there.
         """
         old, self.scene = self.scene, scene
         self._count += 1
         same: dict[str, Mask] = {}
         if old is not None and old.size == scene.size:
-            same = {t.name: unchanged(scene, t.rest) for t in self.tracks if t.rest is not None}
+            same = {t.key: unchanged(scene, t.rest) for t in self.tracks if t.rest is not None}
             self._track_objects(old, scene, same)
         else:
             self._camera, self._camera_track = STILL, CameraTrack()
@@ -144,8 +149,9 @@ class TaughtObjectTracker:
         self._background.move(self._camera)
         self._redetect(scene, bodies)
         self._segment(scene, same)
-        self._background.update(scene, _visible_pixels(self.tracks, scene))
-        self.tracks = tuple(_with_id(t, scene, new_id) for t in self.tracks)
+        self._background.update(scene, visible_pixels(self.tracks, scene))
+        tracks = (_with_id(t, scene, new_id) for t in self.tracks)
+        self.tracks = tuple(t for t in tracks if t.id or t.instance == 1)
         return self.tracks
 
     def _view_numbers(self, name: str) -> list[int]:
@@ -153,14 +159,14 @@ class TaughtObjectTracker:
 
     def _track_objects(self, old: Scene, scene: Scene, same: Mapping[str, Mask]) -> None:
         calm = {n for n, mask in same.items() if np.mean(mask) > UNCHANGED_SHARE}
-        resting = [t for t in self.tracks if t.state is TrackState.RESTING and t.name in calm]
+        resting = [t for t in self.tracks if t.state is TrackState.RESTING and t.key in calm]
         seen = [t for t in self.tracks if t.state in IN_VIEW]
         if self._static and seen and len(resting) == len(seen):
             # The camera rests, too: nothing has moved by a pixel.
             moved = PointMotion(NO_POINTS, NO_POINTS, np.zeros(0, dtype=np.int64))
             camera: Doubles | None = STILL
         else:
-            taken = _object_mask(self.tracks, old)
+            taken = object_mask(self.tracks, old)
             self._camera_track, camera = track_camera(self._camera_track, old, scene, taken)
             moved = self._track_points(old, scene, calm if self._static else set())
         self._static = camera is STILL
@@ -177,7 +183,7 @@ class TaughtObjectTracker:
         """Tracked points of objects that may move."""
         points = [(-1, NO_POINTS)]
         for k, t in enumerate(self.tracks):
-            rests = t.state is TrackState.RESTING and t.name in calm
+            rests = t.state is TrackState.RESTING and t.key in calm
             if t.visible is not None and not rests:
                 points.append((k, _points_on(old, t.visible)))
         owner = np.concatenate([np.full(len(p), k) for k, p in points]).astype(np.int64)
@@ -195,24 +201,50 @@ class TaughtObjectTracker:
         )
         first = self._count == 1
         searched = lost if first else lost[: self._count % SEARCH_INTERVAL == 0]
-        names = {t.name for t in searched}
+        names = {t.key for t in searched}
         candidates = self._search_image(scene, searched)
-        new = {t.name for t in lost if not t.id}
+        new = {t.key for t in lost if not t.id}
         candidates += self._search_at_bodies(scene, bodies, new - {f.name for f in candidates})
         candidates += self._search_by_colour(scene, (new & names) - {f.name for f in candidates})
         taken = [
             (b, self.views[t.view_number].appearance)
             for t in self.tracks
             if t.state in IN_VIEW
-            for b in _occupied_blobs(t, scene)
+            for b in occupied_blobs(t, scene)
         ]
         redetected = self._resolve_look_alikes(assign_candidates(scene, candidates, taken), scene)
-        compared = (
-            replace(t, compared_at=scene.time) if t.name in names else t for t in self.tracks
-        )
+        compared = [
+            replace(t, compared_at=scene.time) if t.key in names else t for t in self.tracks
+        ]
+        blobs = [b for b, _ in taken]
+        for track, place in self._further_instances(scene, new, redetected, blobs):
+            compared.append(track)
+            redetected[track.key] = place
         occluders = [p.visible for p in redetected.values() if p.visible is not None]
         rest = (_without_occluders(t, occluders) for t in compared)
-        self.tracks = tuple(_redetected(t, redetected.get(t.name), scene) for t in rest)
+        self.tracks = tuple(_redetected(t, redetected.get(t.key), scene) for t in rest)
+
+    def _further_instances(
+        self,
+        scene: Scene,
+        new: Collection[str],
+        placed: Mapping[str, RedetectionCandidate],
+        taken: Sequence[Blob],
+    ) -> list[tuple[TaughtObjectTrack, RedetectionCandidate]]:
+        """Further instances of the objects that are detected for the first time, with their positions.
+
+        Of look-alikes that were taught each is found by itself.
+        """
+        first = {n: p for n, p in placed.items() if n in new and not self._alike[p.view_number]}
+        pixels = (p.pixels(scene) for p in placed.values())
+        occupied = [*taken, *(b for b in pixels if b is not None)]
+        views, numbers = self._views_of(set(first)), dict.fromkeys(first, 1)
+        found = []
+        for place in further_instances(scene, first, views, occupied):
+            numbers[place.name] += 1
+            track = TaughtObjectTrack(place.name, place.view_number, instance=numbers[place.name])
+            found.append((track, replace(place, name=track.key)))
+        return found
 
     def _search_image(
         self, scene: Scene, tracks: Sequence[TaughtObjectTrack]
@@ -224,8 +256,9 @@ class TaughtObjectTracker:
         recently_changed = self._change.recently_changed(scene)
         found: list[RedetectionCandidate] = []
         for t in tracks:
-            views, changed = self._views_of({t.name}), self._background.changed(scene, t.name)
-            found += candidates(scene, t, views, changed, recently_changed)
+            views, changed = self._views_of({t.name}), self._background.changed(scene, t.key)
+            places = candidates(scene, t, views, changed, recently_changed)
+            found += [replace(c, name=t.key) for c in places]
         return found
 
     def _search_at_bodies(
@@ -252,7 +285,7 @@ class TaughtObjectTracker:
         self, placed: Mapping[str, RedetectionCandidate], scene: Scene
     ) -> dict[str, RedetectionCandidate]:
         """Resolve positions of look-alikes that are not all searched at once."""
-        sought = {t.name for t in self.tracks if t.state not in IN_VIEW} - set(placed)
+        sought = {t.key for t in self.tracks if t.state not in IN_VIEW} - set(placed)
         found: dict[str, RedetectionCandidate] = {}
         for place in placed.values():
             own = resolve_look_alike(scene, place, self.views, self._alike, sought - set(found))
@@ -343,36 +376,10 @@ def _claim(track: TaughtObjectTrack, scene: Scene, same: Mapping[str, Mask]) -> 
     if track.state not in IN_VIEW or scene.time - track.last_seen > HOLD_S:
         return None
     if track.state is TrackState.RESTING and track.rest is not None:
-        return rest_log_odds(track.rest, same[track.name])
+        return rest_log_odds(track.rest, same[track.key])
     assert track.pose is not None
     assert track.appearance is not None
     return appearance_log_odds(scene, track.pose, track.appearance)
-
-
-def _visible_pixels(tracks: Sequence[TaughtObjectTrack], scene: Scene) -> dict[str, Blob]:
-    """The visible pixels of the objects that are seen in a frame, by name."""
-    seen = (t for t in tracks if t.state in IN_VIEW and t.last_seen == scene.time)
-    return {t.name: t.visible for t in seen if t.visible is not None}
-
-
-def _object_mask(tracks: Sequence[TaughtObjectTrack], scene: Scene) -> Mask:
-    """(h, w) bool: visible objects."""
-    out = np.zeros(scene.size[::-1], dtype=bool)
-    for t in tracks:
-        if t.visible is not None:
-            left, top, right, bottom = t.visible.window
-            out[top:bottom, left:right] |= t.visible.mask
-    return out
-
-
-def _occupied_blobs(track: TaughtObjectTrack, scene: Scene) -> Iterator[Blob]:
-    """Blobs of an object in view; one just redetected has no pixels of its own yet."""
-    if track.visible is not None:
-        yield track.visible
-    elif track.last_seen == scene.time and track.pose is not None and track.appearance is not None:
-        covered = footprint(scene, track.pose, track.appearance)
-        if covered is not None:
-            yield covered
 
 
 def _points_on(scene: Scene, blob: Blob) -> NDArray[np.float32]:
