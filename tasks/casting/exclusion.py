@@ -96,11 +96,11 @@ def _movers(
     """Area and id of moving objects."""
     scene = np.mean([o.region.velocity for o in known], axis=0)
     for o in objects:
-        if _moves(o.id, mind) or _sets_out(o.region, scene, mind):
+        if moves(o.id, mind) or _sets_out(o.region, scene, mind):
             yield o.region.area, o.id
 
 
-def _moves(object_id: int, mind: Mind) -> bool:
+def moves(object_id: int, mind: Mind) -> bool:
     """Whether an object has been moving for a while."""
     now = kinematics(mind)
     noise = SIGMAS * now.one("velocity_sigma", object_id)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from visup.agent import Binding, Mind, Presence
 from visup.agent.model.fast_replace import replace
+from visup.tasks.casting.equals import Settled, among_equals
 from visup.tasks.casting.fitness import Role, fits
 from visup.tasks.casting.matching import match
 from visup.tasks.grammar.nodes import Task
@@ -22,11 +23,13 @@ class Casting:
         rival: A better casting that would take an actor from an object that is still present: object id by
             actor; may be empty.
         rival_since: Time since when that has been better, seconds.
+        settled: Actors that stay with their objects among several equal ones.
     """
 
     bindings: tuple[Binding, ...]
     rival: tuple[int | None, ...]
     rival_since: float
+    settled: Settled = frozenset()
 
 
 def recast(
@@ -44,6 +47,15 @@ def recast(
         acting: Actors of the active steps, which are matched first.
         settings: Time constants.
     """
+    casting = _matched(task, mind, before, acting, settings)
+    bindings, settled = among_equals(casting.bindings, before.settled, task, mind, settings)
+    return replace(casting, bindings=bindings, settled=settled)
+
+
+def _matched(
+    task: Task, mind: Mind, before: Casting, acting: tuple[str, ...], settings: TaskSettings
+) -> Casting:
+    """The casting of the next step by the looks and criteria of single objects."""
     found = match(task, mind, before.bindings, acting, settings)
     pairs = zip(before.bindings, found, strict=False)
     if not any(_changes_hands(a, b, mind) for a, b in pairs):

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from visup.agent import TaskBelief
 from visup.tasks.automaton.states import TaskStep
+from visup.tasks.casting.equals import Settled
 from visup.tasks.supervision.hypotheses import TaskHypotheses
 from visup.tasks.supervision.replay import PastStep
 from visup.tasks.supervision.task_inference import ALONE, TaskActivity
@@ -35,6 +36,7 @@ class TaskMemory:
         broken_since: Time since when each invariant has been broken, seconds, or None.
         rival: A better casting that would change bindings: object id by actor; may be empty.
         rival_since: Time since when it has been better, seconds.
+        settled: Actors that stay with their objects among several equal ones.
         observations: State of its facts: how long they have held, and when they paused work.
         activity: Whether it is in progress, if several tasks are given.
         gain: Latest evidence per second that it is in progress.
@@ -57,6 +59,7 @@ class TaskMemory:
     broken_since: tuple[float | None, ...] = ()
     rival: tuple[int | None, ...] = ()
     rival_since: float = 0.0
+    settled: Settled = frozenset()
     observations: ObservationMemory = NO_MEMORY
     activity: TaskActivity = ALONE
     gain: float = 0.0

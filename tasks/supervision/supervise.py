@@ -255,6 +255,7 @@ def _follow(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> TaskMemor
         broken_since=broken,
         rival=casting.rival,
         rival_since=casting.rival_since,
+        settled=casting.settled,
         gain=_gain(model, start, posterior, snapshot),
         past_steps=past,
         violated=violated,
@@ -308,7 +309,8 @@ def _gain(
 
 def _cast(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> Casting:
     """The casting of this step."""
-    before = Casting(memory.belief.bindings, memory.rival, memory.rival_since)
+    bindings = memory.belief.bindings
+    before = Casting(bindings, memory.rival, memory.rival_since, memory.settled)
     steps = () if memory.posterior is None else leaves(memory.posterior.likeliest.state)
     acting = tuple(a for x in steps for a in x.step.actors)
     return recast(model.task, mind, before, acting, model.settings)
