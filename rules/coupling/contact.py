@@ -32,7 +32,8 @@ class ContactSettings:
             care has braked to less before they meet.
         sure_sigmas: Standard deviations by which such a speed must exceed that.
         rest: Relative speed below which two bodies that nothing carries rest at each other, image diagonals
-            per second, if it is known well.
+            per second.
+        rest_sigmas: Standard deviations by which such a speed must exceed that.
         rest_share: The same as a share of their greatest relative speed since they met.
         fast_share: Share of that speed above which they move fast.
         abrupt_s: Longest time in which a body that moves fast stops abruptly, seconds.
@@ -51,6 +52,7 @@ class ContactSettings:
     sure_share: float = 0.15
     sure_sigmas: float = 3.0
     rest: float = 0.006
+    rest_sigmas: float = 1.0
     rest_share: float = 0.05
     fast_share: float = 0.75
     abrupt_s: float = 0.35
@@ -68,13 +70,17 @@ class RelativeSpeed(NamedTuple):
         speed: Relative speed; None when unknown.
         sigma: Standard deviation of the speed.
         limit: Speed above which one passes the other.
-        rest: Speed above which neither rests at the other, if it is known well.
+        rest: Speed above which neither rests at the other.
     """
 
     speed: float | None
     limit: float
     sigma: float = math.inf
     rest: float = math.inf
+
+    def exceeds(self, limit: float, sigmas: float) -> bool:
+        """Whether the speed is known, and exceeds a limit by some standard deviations."""
+        return self.speed is not None and self.speed - sigmas * self.sigma > limit
 
 
 class Feet(NamedTuple):
@@ -183,16 +189,11 @@ def _with_speed(
     fast_at = now if speed > settings.fast_share * top else contact.fast_at
     contact = replace(contact, top_speed=top, motion_known_at=now, fast_at=fast_at)
     passing = speed > max(motion.limit, settings.slowed_share * top)
-    passing |= _surely_above(max(motion.limit, settings.sure_share * top), motion, settings)
+    passing |= motion.exceeds(max(motion.limit, settings.sure_share * top), settings.sure_sigmas)
     if passing is not contact.passing or not contact.motion_known:
         contact = replace(contact, passing=passing, changed_at=now, motion_known=True)
     path = contact.path + speed * dt if passing else 0.0
     return replace(contact, path=path) if path != contact.path else contact
-
-
-def _surely_above(limit: float, motion: RelativeSpeed, settings: ContactSettings) -> bool:
-    """Whether a relative speed is known to be above a limit."""
-    return motion.speed is not None and motion.speed - settings.sure_sigmas * motion.sigma > limit
 
 
 def _required(contact: OutlineContact, motion: RelativeSpeed, settings: ContactSettings) -> float:
@@ -200,9 +201,8 @@ def _required(contact: OutlineContact, motion: RelativeSpeed, settings: ContactS
     if not contact.motion_known:
         return settings.unknown_s
     gently = contact.changed_at - contact.fast_at > settings.abrupt_s
-    moves = _surely_above(
-        max(motion.rest, settings.rest_share * contact.top_speed), motion, settings
-    )
+    rest = max(motion.rest, settings.rest_share * contact.top_speed)
+    moves = motion.exceeds(rest, settings.rest_sigmas)
     return settings.slow_s if gently and moves else settings.contact_s
 
 

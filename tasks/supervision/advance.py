@@ -17,7 +17,6 @@ from visup.tasks.supervision.open_transitions import (
     OpenTransition,
     earliest_end,
     goes_on,
-    met_since,
     missed,
 )
 from visup.tasks.supervision.sentences import lasted, outcome
@@ -60,9 +59,8 @@ class Advance:
 
         Paused steps are not completed.
         """
-        node = hypothesis.node
         if all(self.observe(x.step).paused for x in leaves(hypothesis.state)):
-            yield node, lambda: hypothesis, 1.0
+            yield hypothesis.node, lambda: hypothesis, 1.0
             return
         present = [(t, self._is_paused(t)) for t in transitions if not self._awaits(t)]
         barred = tuple(t.entered for t, paused in present if paused)
@@ -87,13 +85,13 @@ class Advance:
         for transition, chance in self._chances(hypothesis, supported, due, ends, forced):
             if chance > 0.0:
                 gone += chance
-                target = transition.transition.target
-                yield target, partial(self._moved, hypothesis, transition), chance
+                moved = partial(self._moved, hypothesis, transition)
+                yield transition.transition.target, moved, chance
         if not forced:
             considered = tuple((t.entered, support) for t, support in supported)
             considered += tuple(c for c in hypothesis.considered if c[0] in barred)
             stayed = replace(hypothesis, considered=considered)
-            yield node, lambda: stayed, max(0.0, 1.0 - gone)
+            yield stayed.node, lambda: stayed, max(0.0, 1.0 - gone)
 
     def _awaits(self, transition: OpenTransition) -> bool:
         """Whether a transition begins a round of a loop whose new actor is not present."""
@@ -223,14 +221,11 @@ class Advance:
 
     def _skipped(self, transition: OpenTransition) -> float:
         """Probability of completing the steps of a transition in their current state."""
-        entered, seen = transition.entered, self.observe
-        met = (met_since(x, entered, seen) for x in transition.left)
-        return math.prod(
-            1.0 if m else self._passed_over(x) for m, x in zip(met, transition.left, strict=True)
-        )
+        met = transition.completed_by_meeting(self.observe)
+        return math.prod(self._passed_over(x) for x in transition.left if x.step not in met)
 
     def _passed_over(self, leaf: Leaf[StepMonitor]) -> float:
-        # An action that held, without a required duration, is over as soon as the next is observed.
+        # What held, without a required duration, is over as soon as the next is observed.
         lasts, held = self.steps.actions[leaf.step.action].lasts, leaf.payload.held
         if leaf.payload.fulfilled or (held and not lasts and leaf.step.hold_s is None):
             return 1.0

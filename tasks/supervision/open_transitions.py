@@ -76,6 +76,16 @@ class OpenTransition:
             begun[stage] = min(since, begun.get(stage, since))
         return max(begun.values(), default=None)
 
+    def completed_by_meeting(self, observe: Observe) -> frozenset[TaskStep]:
+        """The approaches that are completed because the two have met since they began, if nothing fails.
+
+        However little was seen of them: what is carried along an arc hardly comes nearer before it is put
+        down.
+        """
+        if any(x.payload.status in BAD for x in self.left):
+            return frozenset()
+        return frozenset(x.step for x in self.left if _met_since(x, self.entered, observe))
+
     @property
     def share(self) -> float:
         """Its share among the transitions that complete the same steps."""
@@ -94,6 +104,17 @@ class OpenTransition:
         return with_payloads(self.state, new)
 
 
+def _met_since(left: Leaf[StepMonitor], entered: tuple[TaskStep, ...], observe: Observe) -> bool:
+    """Whether the actors of an approach have met since it began, so that a step that it leads to holds."""
+    if left.step.action != "converging":
+        return False
+    mine = set(left.step.actors)
+    held = (observe(s).held_by for s in entered if set(s.actors) == mine)
+    return any(
+        h is not None and h.name in MEETINGS and h.since > left.payload.entered for h in held
+    )
+
+
 def goes_on(step: TaskStep, left: tuple[Leaf[StepMonitor], ...]) -> bool:
     """Whether a step repeats a completed one whose action has not ceased: it must cease first."""
     return any(step.same_as(x.step) and not x.payload.ceased for x in left)
@@ -105,20 +126,6 @@ def earliest_end(left: Leaf[StepMonitor]) -> float:
     if left.step.hold_s is not None and monitor.fulfilled_at is not None:
         return monitor.fulfilled_at
     return monitor.entered if monitor.begun is None else monitor.begun
-
-
-def met_since(left: Leaf[StepMonitor], entered: tuple[TaskStep, ...], observe: Observe) -> bool:
-    """Whether an approach is completed because the two have met since it began.
-
-    However little was seen of it: what is carried along an arc hardly comes nearer until it is put down.
-    """
-    if left.step.action != "converging":
-        return False
-    mine = set(left.step.actors)
-    held = (observe(s).held_by for s in entered if set(s.actors) == mine)
-    return any(
-        h is not None and h.name in MEETINGS and h.since > left.payload.entered for h in held
-    )
 
 
 def missed(monitor: StepMonitor, seen: ActionObservation, since: float, now: float) -> StepMonitor:
