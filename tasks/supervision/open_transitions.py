@@ -106,13 +106,11 @@ class OpenTransition:
 
 def _met_since(left: Leaf[StepMonitor], entered: tuple[TaskStep, ...], observe: Observe) -> bool:
     """Whether the actors of an approach have met since it began, so that a step that it leads to holds."""
-    if left.step.action != "converging":
+    begun, mine = left.payload.begun, set(left.step.actors)
+    if begun is None or left.step.action != "converging":
         return False
-    mine = set(left.step.actors)
     held = (observe(s).held_by for s in entered if set(s.actors) == mine)
-    return any(
-        h is not None and h.name in MEETINGS and h.since > left.payload.entered for h in held
-    )
+    return any(h is not None and h.name in MEETINGS and h.since > begun for h in held)
 
 
 def goes_on(step: TaskStep, left: tuple[Leaf[StepMonitor], ...]) -> bool:
