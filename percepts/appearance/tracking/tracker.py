@@ -231,11 +231,8 @@ class TaughtObjectTracker:
         placed: Mapping[str, RedetectionCandidate],
         taken: Sequence[Blob],
     ) -> list[tuple[TaughtObjectTrack, RedetectionCandidate]]:
-        """Further instances of the objects that are detected for the first time, with their positions.
-
-        Of look-alikes that were taught each is found by itself.
-        """
-        first = {n: p for n, p in placed.items() if n in new and not self._alike[p.view_number]}
+        """Further instances of the objects that are detected for the first time, with their positions."""
+        first = {n: p for n, p in placed.items() if n in new}
         pixels = (p.pixels(scene) for p in placed.values())
         occupied = [*taken, *(b for b in pixels if b is not None)]
         views, numbers = self._views_of(set(first)), dict.fromkeys(first, 1)
