@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -21,8 +20,8 @@ from visup.agent import (
 )
 from visup.agent.model.memory import MemoryKey
 from visup.agent.model.relation_columns import UNKNOWN_CODE, ColumnLayout, RelationBlock
-from visup.rules.coupling.contact import ContactSettings, Feet, OutlineContact, RelativeSpeed
-from visup.rules.coupling.relative_motion import RelativeTrack, RelativeVelocity
+from visup.rules.coupling.contact import ContactSettings, Feet, OutlineContact
+from visup.rules.coupling.relative_motion import RelativeTrack
 from visup.rules.geometry.regions import image_diagonal
 from visup.rules.presence.object_tracks import merged_pairs
 from visup.rules.relations.reasoner import kinematics
@@ -239,20 +238,6 @@ def pair_regions(seen: PairObservation, mind: Mind) -> tuple[Region, Region] | N
     if Presence.HIDDEN in (first.presence, second.presence):
         return None
     return first.region, second.region
-
-
-def relative_speed(
-    found: RelativeVelocity | None, pair: Pair, mind: Mind, settings: ContactSettings
-) -> RelativeSpeed:
-    """How fast the bodies of a pair move relative to each other, and above which speed one passes."""
-    diagonal = image_diagonal(mind.frame_size)
-    limit = max(settings.passing * diagonal, settings.passing_share * common_speed(mind, pair))
-    if found is None:
-        return RelativeSpeed(None, limit)
-    # What is carried is in contact where it comes to rest or is let go, which has rules of its own.
-    free = not any(len(set(pair) & set(c.objects)) == 1 for c in mind.couplings)
-    rest = settings.rest * diagonal if free else math.inf
-    return RelativeSpeed(float(np.hypot(*found.velocity)), limit, found.speed_sigma, rest)
 
 
 def feet_of(seen: PairObservation, mind: Mind) -> Feet | None:

@@ -16,6 +16,7 @@ while the depth of either is unknown, this cannot be distinguished from contact.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import combinations
@@ -52,7 +53,6 @@ from visup.rules.coupling.evidence import (
     pair_regions,
     regions_apart,
     relation_table,
-    relative_speed,
     smaller_size,
     touching_bodies,
 )
@@ -291,13 +291,18 @@ class CouplingReasoner(ExplainableReasoner):
     ) -> OutlineContact:
         """The updated contact of two outlines that meet: whether one passes the other."""
         s, track = self.settings.contact, before.relative_track
+        limit = s.passing * image_diagonal(mind.frame_size)
+        limit = max(limit, s.passing_share * common_speed(mind, seen.pair))
+        speed = None if found is None else float(np.hypot(*found.velocity))
         dt = mind.time - track.path_end if track is not None else 0.0
-        crossed = before.contact.path if before.contact else 0.0
+        moment, crossed = (mind.time, dt), before.contact.path if before.contact else 0.0
         least = s.doubt_share * smaller_size(seen.pair, mind)
         thrown_back = seen.diverging == YES and crossed < least
-        motion = relative_speed(found, seen.pair, mind, s)
-        moment, feet = (mind.time, dt), feet_of(seen, mind)
-        return update_contact(before.contact, motion, moment, s, thrown_back=thrown_back, feet=feet)
+        sigma = math.inf if found is None else found.speed_sigma
+        feet = feet_of(seen, mind)
+        return update_contact(
+            before.contact, speed, limit, moment, s, sigma=sigma, thrown_back=thrown_back, feet=feet
+        )
 
     def _departs(
         self,

@@ -8,12 +8,7 @@ from collections.abc import Sequence
 from hypothesis import given
 from hypothesis import strategies as st
 
-from visup.rules.coupling.contact import (
-    ContactSettings,
-    OutlineContact,
-    RelativeSpeed,
-    update_contact,
-)
+from visup.rules.coupling.contact import ContactSettings, OutlineContact, update_contact
 
 SETTINGS = ContactSettings()
 LIMIT, DT = 10.0, 0.1
@@ -24,7 +19,7 @@ speeds = st.lists(st.one_of(st.none(), st.floats(0, 40)), min_size=1, max_size=3
 def seen(speeds: Sequence[float | None]) -> OutlineContact:
     contact = None
     for k, speed in enumerate(speeds):
-        contact = update_contact(contact, RelativeSpeed(speed, LIMIT), (k * DT, DT), SETTINGS)
+        contact = update_contact(contact, speed, LIMIT, (k * DT, DT), SETTINGS)
     assert contact is not None
     return contact
 
@@ -47,9 +42,7 @@ def eased(sigma: float) -> OutlineContact:
     """A boat that eases alongside: it keeps a fifth of its speed for a while, known to within `sigma`."""
     contact = None
     for k, speed in enumerate([100.0] * 5 + [20.0] * 5):
-        contact = update_contact(
-            contact, RelativeSpeed(speed, LIMIT, sigma), (k * DT, DT), SETTINGS
-        )
+        contact = update_contact(contact, speed, LIMIT, (k * DT, DT), SETTINGS, sigma=sigma)
     assert contact is not None
     return contact
 
@@ -68,7 +61,7 @@ def test_nobody_settles_earlier_for_knowing_better(
     for k, speed in enumerate(told):
         moment = k * DT, DT
         kept = [
-            update_contact(c, RelativeSpeed(speed, LIMIT, sigma), moment, SETTINGS)
+            update_contact(c, speed, LIMIT, moment, SETTINGS, sigma=sigma)
             for c, sigma in zip(kept, (one, one + more), strict=True)
         ]
         well, badly = kept
@@ -93,8 +86,7 @@ def test_what_is_not_seen_to_move_on_any_more_settles() -> None:
 
 @given(speeds)
 def test_what_is_thrown_back_has_made_contact(told: list[float | None]) -> None:
-    motion = RelativeSpeed(30.0, LIMIT)
-    contact = update_contact(seen(told), motion, (9.0, DT), SETTINGS, thrown_back=True)
+    contact = update_contact(seen(told), 30.0, LIMIT, (9.0, DT), SETTINGS, thrown_back=True)
     assert contact.confirmed_since is not None
     assert not contact.passing
 
@@ -112,43 +104,3 @@ def test_rest_ends_every_passing(told: list[float | None], slow: float) -> None:
     contact = seen([*told, slow, slow, slow])
     assert contact.confirmed_since is not None
     assert contact.path == 0.0
-
-
-def brought_alongside(speeds: Sequence[float], rest: float) -> float | None:
-    """When a body is in contact of which these relative speeds are known well."""
-    contact = None
-    for k, speed in enumerate(speeds):
-        motion = RelativeSpeed(speed, LIMIT, sigma=0.5, rest=rest)
-        contact = update_contact(contact, motion, (k * DT, DT), SETTINGS)
-    assert contact is not None
-    return contact.confirmed_since
-
-
-EASING = [100.0] * 3 + [60.0, 40.0, 30.0, 25.0, 20.0] + [12.0] * 5 + [1.0] * 5
-"""A boat that is brought alongside: it drifts for half a second at an eighth of its speed before it rests."""
-
-
-def test_what_slows_down_gently_has_touched_once_it_rests() -> None:
-    assert brought_alongside(EASING, rest=4.0) == brought_alongside(EASING[:-4], rest=4.0) == 1.3
-
-
-def test_what_is_carried_has_touched_when_it_is_slow() -> None:
-    assert brought_alongside(EASING, rest=math.inf) == 1.0
-
-
-def test_what_stops_abruptly_has_touched_even_if_it_pushes_on() -> None:
-    assert brought_alongside([100.0] * 3 + [12.0] * 5, rest=4.0) == 0.5
-
-
-def test_what_stays_slow_has_touched_after_a_while() -> None:
-    at = brought_alongside([100.0] * 3 + [60.0, 40.0, 30.0, 25.0] + [12.0] * 20, rest=4.0)
-    assert at is not None
-    assert SETTINGS.slow_s <= at - 0.7 < SETTINGS.slow_s + 2 * DT
-
-
-@given(st.lists(st.floats(0, 40), min_size=1, max_size=40), st.floats(0, 20), st.floats(0, 20))
-def test_nobody_settles_earlier_for_a_lower_speed_of_rest(
-    speeds: list[float], rest: float, more: float
-) -> None:
-    early, late = (brought_alongside(speeds, r) for r in (rest + more, rest))
-    assert late is None or (early is not None and early <= late)

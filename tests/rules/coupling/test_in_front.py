@@ -12,13 +12,7 @@ from tests.rules.runs import Thought, reason
 from tests.rules.scenes import box_region, seen
 from visup.agent import Coupling, Mind, Truth, Verdict
 from visup.agent.model.task_beliefs import TaskBelief
-from visup.rules.coupling.contact import (
-    ContactSettings,
-    Feet,
-    OutlineContact,
-    RelativeSpeed,
-    update_contact,
-)
+from visup.rules.coupling.contact import ContactSettings, Feet, OutlineContact, update_contact
 from visup.rules.coupling.evidence import NO, YES, PairObservation, feet_of, move_alike
 
 SPREADER, CONTAINER, TRUCK = 1, 2, 3
@@ -73,8 +67,7 @@ def contact(*feet: Feet | None) -> OutlineContact:
     """Two that meet, at rest, after looks at their feet."""
     found = None
     for k, look in enumerate(feet):
-        motion = RelativeSpeed(0.0, limit=10.0)
-        found = update_contact(found, motion, (k * 0.1, 0.1), ContactSettings(), feet=look)
+        found = update_contact(found, 0.0, 10.0, (k * 0.1, 0.1), ContactSettings(), feet=look)
     assert found is not None
     return found
 
