@@ -17,11 +17,15 @@ from visup.percepts.appearance.models.appearance_model import ViewModel
 from visup.percepts.appearance.models.blob import Blob, overlap_of_smaller
 from visup.percepts.appearance.models.scene import Scene
 from visup.percepts.appearance.tracking.redetection import (
-    EQUAL_SCORE,
-    MAX_INSTANCES,
     RedetectionCandidate,
     view_candidates,
 )
+
+MAX_INSTANCES = 3
+"""Most objects that look the same."""
+
+EQUAL_SCORE = 0.85
+"""Least score of a further instance, relative to that of the first one."""
 
 MAX_OVERLAP = 0.1
 """Greatest share of a further instance that lies on another object."""

@@ -23,10 +23,6 @@ SURE = 0.6  # score that suffices by itself: no other object was observed to rea
 FAIR, APART = 0.42, 1.5  # score that suffices if it exceeds those of other positions by a factor
 MIN_COLOUR_EXCESS = 0.45
 """Least excess of the object's colours at a position over those around it."""
-EQUAL_SCORE = 0.85
-"""Least score of another object that looks the same, relative to the best one."""
-MAX_INSTANCES = 3
-"""Most objects that look the same."""
 NOISE = 0.15  # score that any position may have by chance
 MOVING_FAIR, MOVING_APART = 0.45, 1.2  # as FAIR and APART, among positions that changed recently
 TAUGHT_POSE_BONUS = 0.1  # bonus of the position where an object was taught
@@ -127,7 +123,7 @@ def view_candidates(
             m,
             m.score + TAUGHT_POSE_BONUS * (m.pose.apart(home, 10) < near),
         )
-        for m in _clearly_best(matches, appearance, most=MAX_INSTANCES)
+        for m in _clearly_best(matches, appearance)
     ]
 
 
@@ -274,29 +270,14 @@ def _colour_match(
 
 
 def _clearly_best(
-    matches: Sequence[Match], appearance: Appearance, apart: float = APART, most: int = 1
+    matches: Sequence[Match], appearance: Appearance, apart: float = APART
 ) -> list[Match]:
-    """The matches that are clearly better than those of other positions.
-
-    Args:
-        matches: The matches.
-        appearance: The appearance that they match.
-        apart: Factor by which they must be better.
-        most: Most positions that may be best together, since they match about equally well.
-    """
+    """The matches that are clearly better than those of other positions."""
     if not matches:
         return []
-    ranked = sorted(matches, key=lambda m: -m.score)
-    best = [ranked[0].pose]
-
-    def is_elsewhere(match: Match) -> bool:
-        return all(match.pose.apart(p, 0) > appearance.radius * p.scale for p in best)
-
-    for match in ranked:
-        equal = match.score >= EQUAL_SCORE * ranked[0].score
-        if equal and len(best) < most and is_elsewhere(match):
-            best.append(match.pose)
-    rival = max([*(m.score for m in matches if is_elsewhere(m)), NOISE])
+    top = max(matches, key=lambda m: m.score).pose
+    away = [m.score for m in matches if m.pose.apart(top, 0) > appearance.radius * top.scale]
+    rival = max([*away, NOISE])
     return [m for m in matches if m.score > SURE or (m.score > FAIR and m.score > apart * rival)]
 
 

@@ -204,14 +204,17 @@ class TaughtObjectTracker:
         names = {t.key for t in searched}
         candidates = self._search_image(scene, searched)
         new = {t.key for t in lost if not t.id}
-        candidates += self._search_at_bodies(scene, bodies, new - {f.name for f in candidates})
-        candidates += self._search_by_colour(scene, (new & names) - {f.name for f in candidates})
         taken = [
             (b, self.views[t.view_number].appearance)
             for t in self.tracks
             if t.state in IN_VIEW
             for b in occupied_blobs(t, scene)
         ]
+        # What matches only where another object is has not been found.
+        left = new - set(assign_candidates(scene, candidates, taken))
+        at_bodies = self._search_at_bodies(scene, bodies, left)
+        left -= {c.name for c in at_bodies}
+        candidates += [*at_bodies, *self._search_by_colour(scene, left & names)]
         redetected = self._resolve_look_alikes(assign_candidates(scene, candidates, taken), scene)
         compared = [
             replace(t, compared_at=scene.time) if t.key in names else t for t in self.tracks
