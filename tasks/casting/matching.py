@@ -15,7 +15,9 @@ from scipy.optimize import linear_sum_assignment
 
 from visup.agent import Binding, Mind, ObjectBelief, Presence
 from visup.agent.model.fast_replace import replace
-from visup.tasks.casting.exclusion import guessed
+from visup.rules.presence.object_tracks import presence_memory, sides_of
+from visup.rules.relations.reasoner import kinematics
+from visup.tasks.casting.exclusion import guessed, moves
 from visup.tasks.casting.fitness import Role, fits
 from visup.tasks.grammar.nodes import Task
 from visup.tasks.grammar.structure import machines_of, stage_actors, stage_names, task_actors
@@ -209,19 +211,31 @@ def _unknown(mind: Mind, number: int, settings: TaskSettings) -> bool:
 def scenery(
     mind: Mind, bindings: Sequence[Binding], settings: TaskSettings = DEFAULT_SETTINGS
 ) -> tuple[int, ...]:
-    """Ids of unknown objects visible from the start: part of the scene.
+    """Ids of objects without a role that are part of the scene.
 
-    An object that looks like an actor found elsewhere counts as unknown.
+    These are unknown objects visible from the start, and those that look like an actor found elsewhere if
+    they were there from the start, or were first seen at rest inside the image: equal parts on a table.
     """
     bound = {b.object_id for b in bindings}
     taken = {m for b in bindings if b.object_id is not None for m in b.models}
-    return tuple(
-        o.id
-        for o in mind.present()
-        if o.id not in bound
-        and (o.strength < settings.familiar or o.name in taken)
-        and o.first_seen <= settings.scenery_s
-    )
+    found = []
+    for o in mind.present():
+        equal = o.name in taken
+        from_start = o.first_seen <= settings.scenery_s
+        if o.id in bound or not (equal or (from_start and o.strength < settings.familiar)):
+            continue
+        if from_start or _lies_there(o.id, mind):
+            found.append(o.id)
+    return tuple(found)
+
+
+def _lies_there(object_id: int, mind: Mind) -> bool:
+    """Whether an object is at rest that did not come in over the border of the image."""
+    track = presence_memory(mind).tracks.get(object_id)
+    if track is None or sides_of(track.first_box, mind.frame_size):
+        return False
+    speed = kinematics(mind).one("speed", object_id)
+    return speed == speed and not moves(object_id, mind)  # NaN is not equal to itself
 
 
 def match_strength(actors: Sequence[str], bindings: Sequence[Binding]) -> float:

@@ -10,8 +10,10 @@ from tests.tasks.casting.test_exclusion import mind_of
 from tests.tasks.scripted import belief
 from visup.agent import Binding, Mind, Relation, Truth
 from visup.agent.model.fast_replace import replace
+from visup.rules.presence.object_tracks import TRACKS, PresenceMemory, new_track
 from visup.tasks import parse_task
 from visup.tasks.casting.equals import Encounter, among_equals, encounter
+from visup.tasks.casting.matching import scenery
 from visup.tasks.verification.settings import DEFAULT_SETTINGS
 
 TASK = parse_task("<t> ::= <reach>\n<reach> ::= converging(gripper, part)")
@@ -100,3 +102,22 @@ def test_the_weightiest_encounter_counts_and_leaving_only_by_itself() -> None:
     assert encounter(ONE, [GRIPPER], mind) is Encounter.LEFT_BEHIND
     assert encounter(ONE, [GRIPPER, OTHER], mind) is Encounter.HELD
     assert encounter(GRIPPER, [], mind) is Encounter.NOTHING
+
+
+@pytest.mark.parametrize(
+    ("moving", "box", "first_seen", "expected"),
+    [
+        ((), (100, 100, 20, 20), 5.0, True),  # it is found late, where it lies
+        ((), (100, 100, 20, 20), 0.5, True),
+        ((OTHER,), (100, 100, 20, 20), 5.0, False),  # somebody brings it
+        ((), (0, 100, 20, 20), 5.0, False),  # it has come in
+    ],
+)
+def test_an_equal_object_that_lies_there_is_part_of_the_scene(
+    moving: Sequence[int], box: tuple[int, int, int, int], first_seen: float, expected: bool
+) -> None:
+    mind = scene([], moving)
+    other = replace(mind.objects[OTHER], first_seen=first_seen)
+    track = replace(new_track(other.region, first_seen), first_box=box)
+    mind = mind.with_objects(other).remember(TRACKS, PresenceMemory(0.0, {OTHER: track}))
+    assert (OTHER in scenery(mind, BINDINGS)) is expected
