@@ -51,18 +51,18 @@ def among_equals(
     """
     found = list(bindings)
     for k, binding in enumerate(found):
-        rivals = _rivals(binding, found, task, mind, settings)
         mine = binding.object_id
-        if mine is None or not rivals or (binding.actor, mine) in settled:
+        if mine is None or binding.guessed or (binding.actor, mine) in settled:
             continue
         others = [b.object_id for b in found if b.object_id is not None and b is not binding]
-        happened = {o.id: encounter(o.id, others, mind) for o in rivals}
-        best = max(rivals, key=lambda o: happened[o.id])
         here = encounter(mine, others, mind)
-        if here < Encounter.MET and happened[best.id] > max(here, Encounter.NOTHING):
-            now = strength(best, binding.models)
-            found[k] = replace(binding, object_id=best.id, strength=now)
-            mine, here = best.id, happened[best.id]
+        rivals = _rivals(binding, found, task, mind, settings) if here < Encounter.MET else []
+        happened = [(encounter(o.id, others, mind), -o.id) for o in rivals]
+        best, number = max(happened, default=(Encounter.NOTHING, 0))
+        if best > max(here, Encounter.NOTHING):
+            mine, here = -number, best
+            now = strength(mind.objects[mine], binding.models)
+            found[k] = replace(binding, object_id=mine, strength=now)
         if here >= Encounter.MET:
             settled |= {(binding.actor, mine)}
     playing = {(b.actor, b.object_id) for b in found}
@@ -78,7 +78,7 @@ def _rivals(
 ) -> list[ObjectBelief]:
     """The objects in view without a role that look as much like an actor as the one that plays it."""
     mine = mind.objects.get(binding.object_id) if binding.object_id is not None else None
-    if mine is None or binding.guessed or not binding.models or mine.id in mind.answers:
+    if mine is None or not binding.models or mine.id in mind.answers:
         return []
     if task.actor(binding.actor).criteria:
         return []  # the user has said which of them is meant

@@ -238,9 +238,9 @@ class TaughtObjectTracker:
         first = {n: p for n, p in placed.items() if n in new}
         pixels = (p.pixels(scene) for p in placed.values())
         occupied = [*taken, *(b for b in pixels if b is not None)]
-        views, numbers = self._views_of(set(first)), dict.fromkeys(first, 1)
+        numbers = {t.name: t.instance for t in self.tracks}  # the last of each name is the highest
         found = []
-        for place in further_instances(scene, first, views, occupied):
+        for place in further_instances(scene, first, self._views_of(set(first)), occupied):
             numbers[place.name] += 1
             track = TaughtObjectTrack(place.name, place.view_number, instance=numbers[place.name])
             found.append((track, replace(place, name=track.key)))

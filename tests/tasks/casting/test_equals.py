@@ -75,10 +75,16 @@ def test_what_has_been_met_stays() -> None:
     bindings, settled = among_equals(
         BINDINGS, frozenset(), TASK, scene([("in_contact", GRIPPER, ONE)]), DEFAULT_SETTINGS
     )
-    assert settled == {("part", ONE)}
+    assert settled == {("gripper", GRIPPER), ("part", ONE)}
     assert bindings == BINDINGS
     later = scene([("diverging", GRIPPER, ONE), ("coupled", GRIPPER, OTHER)])
     assert part_of(later, settled) == ONE
+
+
+def test_what_was_met_stays_though_an_equal_object_comes_later() -> None:
+    alone = scene([("coupled", GRIPPER, ONE)], like=0.0)
+    _, settled = among_equals(BINDINGS, frozenset(), TASK, alone, DEFAULT_SETTINGS)
+    assert part_of(scene([("converging", GRIPPER, OTHER)]), settled) == ONE
 
 
 def test_an_actor_with_another_object_is_no_longer_settled() -> None:
