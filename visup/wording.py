@@ -42,7 +42,7 @@ EVENT_KINDS: Mapping[str, str] = {
     "stage_failed": "a stage has failed",
     "stage_done": "a stage is complete",
     "stage_unknown": "a stage cannot be judged",
-    "stage_revised": "a stage that was reported complete is now believed not to have happened",
+    "stage_revised": "a stage that was reported complete is now believed to go on, or not to have happened",
     "invariant_broken": "an invariant of a task (`never`, `always`) is violated",
     "verdict": "the verdict on a task changes",
 }

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from itertools import zip_longest
 
 from visup.tasks.automaton.states import TaskStep
 
@@ -44,28 +43,25 @@ class Revision:
     reported: float
     revised: float
 
-    def __str__(self) -> str:
-        return (
-            f"`{self.step.stage}`, reported complete at {self.reported:.1f} s, "
-            f"is now believed not to have happened"
-        )
+    def text(self, goes_on: bool = False) -> str:
+        """What is said about it; `goes_on` if the stage is believed to be under way still."""
+        believed = "still to be going on" if goes_on else "not to have happened"
+        return f"`{self.step.stage}`, reported complete at {self.reported:.1f} s, is now believed {believed}"
 
 
 def extended(
     backpointer: Backpointer | None,
-    left: tuple[TaskStep, ...],
+    left: Iterable[tuple[TaskStep, float | None]],
     now: float,
-    begun: tuple[float | None, ...] = (),
 ) -> Backpointer | None:
     """A path extended by the steps completed now; the oldest steps are forgotten.
 
     Args:
         backpointer: The path so far; None if it is empty.
-        left: The steps completed now.
+        left: The steps completed now, each with the time when it was first observed in seconds, or None.
         now: Current time, seconds.
-        begun: Time when each of them was first observed, seconds, or None.
     """
-    for step, since in zip_longest(left, begun):
+    for step, since in left:
         length = backpointer.length + 1 if backpointer else 1
         backpointer = Backpointer(step, now, backpointer, length, since)
     if backpointer is not None and backpointer.length % MAX_BEHIND == 0:

@@ -73,7 +73,7 @@ class HiddenPhases:
                 if fit is None:
                     fit = fits[to] = self._likelihood(to, evidence)
                 if transition.left:
-                    behind = extended(behind, transition.left, now)
+                    behind = extended(behind, ((s, None) for s in transition.left), now)
                 chance = transition.chance * fit
                 yield to, behind, weighted.mass * chance, weighted.best * chance
 

@@ -250,8 +250,6 @@ class Advance:
                 else x
                 for x in under_way
             ]
-        left = tuple(x.step for x in transition.left)
-        begun_at = tuple(x.payload.begun for x in transition.left)
         early = self._early(hypothesis, transition)
         if early:
             under_way = [
@@ -265,9 +263,10 @@ class Advance:
             with_leaves(state, iter(under_way)),
             transition.transition.target,
             self._past(hypothesis, transition, stages),
-            backpointer=extended(hypothesis.backpointer, left, self.now, begun_at),
+            backpointer=extended(hypothesis.backpointer, transition.completed, self.now),
             gone_on=True,
             lasting="" if opened or unreached is not None else self._lasting(transition, stages),
+            contact_entry=transition.contact_entry(hypothesis, self.observe, self.now),
         )
 
     def _lasting(self, transition: OpenTransition, under_way: Collection[str]) -> str:

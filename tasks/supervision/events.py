@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from types import MappingProxyType
 
 from visup.agent import (
@@ -49,6 +49,7 @@ def stage_events(
     mind: Mind,
     task: Task,
     onsets: Mapping[str, float] = NOTHING,
+    revised: Collection[str] = (),
 ) -> Iterator[Event]:
     """Events of what changed between two beliefs about a task.
 
@@ -58,6 +59,7 @@ def stage_events(
         mind: The mind, for the time; it may still hold the old belief.
         task: The task, for the texts of its stages.
         onsets: Stage that begins now -> time when it most probably began, seconds; missing: now.
+        revised: Stages whose report of completion is taken back: they have not begun again.
 
     Yields:
         Events of stages in the order of the task, then a change of the verdict.
@@ -69,7 +71,7 @@ def stage_events(
     mind = replace(mind, tasks=(now,))  # objects are named by their actors in this task
     first, done = is_first(before.stages), done_stages(before)
     for stage in changed:
-        for kind in _kinds(was.get(stage.stage), stage):
+        for kind in _kinds(was.get(stage.stage), stage, stage.stage in revised):
             undone = stage.stage in done and stage.status in BAD
             event = _stage_event(kind, stage, now, mind, undone)
             if first and kind == "stage_started" and event.objects:
@@ -112,13 +114,13 @@ def played(belief: TaskBelief, actors: Sequence[str]) -> tuple[int, ...]:
 def revision_events(
     before: TaskBelief, now: TaskBelief, revisions: Sequence[Revision], mind: Mind
 ) -> Iterator[Event]:
-    """Events of stages that were reported done, and are now believed not to have happened."""
+    """Events of stages that were reported done, and are now believed not to be done, or not to have begun."""
     done, still = done_stages(before), done_stages(now)
     earliest = {r.step.stage: r for r in revisions}  # revisions come latest step first
     for stage, revision in earliest.items():
         if stage in done and stage not in still:
             data = {"task": now.task, "stage": stage, "told": revision.reported}
-            text = f"Stage {revision}."
+            text = f"Stage {revision.text(stage in _under_way(now))}."
             yield Event(
                 "stage_revised",
                 mind.time,
@@ -128,6 +130,11 @@ def revision_events(
                 now.confidence,
                 data=data,
             )
+
+
+def _under_way(belief: TaskBelief) -> set[str]:
+    """The stages that go on."""
+    return {s.stage for s in belief.stages if s.status in GOES_ON}
 
 
 def done_stages(belief: TaskBelief) -> set[str]:
@@ -165,12 +172,12 @@ def _is_news(was: StageBelief | None, now: StageBelief) -> bool:
     return now.status is not before or now.begun is not (was is not None and was.begun)
 
 
-def _kinds(was: StageBelief | None, now: StageBelief) -> Iterator[str]:
+def _kinds(was: StageBelief | None, now: StageBelief, revised: bool) -> Iterator[str]:
     before = Status.PENDING if was is None else was.status
     # A stage that was reported done counts as begun again only if it makes progress or stalls: if it fails,
     # it is undone instead.
     again = before is Status.DONE and now.status in (Status.PROGRESSING, Status.STALLED)
-    if again or (now.begun and not (was is not None and was.begun)):
+    if not revised and (again or (now.begun and not (was is not None and was.begun))):
         yield "stage_started"
     if now.status is before:
         return

@@ -60,6 +60,26 @@ NOT_BEGUN: Standing = (Progress.PENDING, Status.PENDING)
 
 
 @dataclass(frozen=True)
+class ContactEntry:
+    """A contact by which a hypothesis went on; the two may turn out to have passed each other.
+
+    Attributes:
+        step: The step that began by it.
+        at: When the hypothesis went on, seconds.
+        before: What the hypothesis was before.
+    """
+
+    step: TaskStep
+    at: float
+    before: TaskHypothesis
+
+    @classmethod
+    def of(cls, step: TaskStep, now: float, before: TaskHypothesis) -> ContactEntry:
+        """A contact by which a hypothesis goes on now; if it is taken back, entries are observed anew."""
+        return cls(step, now, replace(before, entries=(), met=(), contact_entry=None))
+
+
+@dataclass(frozen=True)
 class TaskHypothesis:
     """One possible course of the task.
 
@@ -75,6 +95,7 @@ class TaskHypothesis:
         gone_on: Whether it has completed a step.
         lasting: The stage completed last, if it lasts until the next one begins and that beginning was not
             observed; otherwise empty.
+        contact_entry: The last contact of two actors by which it went on; None if there was none.
     """
 
     state: State[StepMonitor]
@@ -87,6 +108,7 @@ class TaskHypothesis:
     backpointer: Backpointer | None = None
     gone_on: bool = False
     lasting: str = ""
+    contact_entry: ContactEntry | None = None
 
     @property
     def begun(self) -> bool:

@@ -48,6 +48,7 @@ class TaskMemory:
             works there.
         forbidden: Whether a broken invariant interrupted it, which is final: its stages no longer change.
         order_violation: The step that was done before its turn and has not been undone, or None.
+        resting: Stages that wait to begin, each with the time since when its actors rest, seconds.
     """
 
     time: float
@@ -69,3 +70,4 @@ class TaskMemory:
     familiar_objects: tuple[int, ...] = ()
     forbidden: bool = False
     order_violation: OrderViolation | None = None
+    resting: tuple[tuple[str, float], ...] = ()

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import islice
 
 from visup.agent import Relation, Status
@@ -30,8 +30,9 @@ from visup.tasks.automaton.transitions import HiddenState
 from visup.tasks.grammar.nodes import StageCondition, Task
 from visup.tasks.grammar.structure import pause_conditions
 from visup.tasks.supervision.advance import Advance
-from visup.tasks.supervision.hypotheses import TaskHypotheses, TaskHypothesis
+from visup.tasks.supervision.hypotheses import ContactEntry, TaskHypotheses, TaskHypothesis
 from visup.tasks.supervision.open_transitions import OpenTransitions
+from visup.tasks.verification.observation import ActionObservation
 from visup.tasks.verification.settings import TaskSettings
 from visup.tasks.verification.step_model import Observe, StepModel
 from visup.tasks.verification.step_monitor import BAD, Moment
@@ -179,9 +180,30 @@ class MonitoredPhases:
             hypothesis, fit = self._aged(weighted.value, evidence, now, dt)
             fit *= self._false_alarms(weighted.value, seen)
             mass, best = weighted.mass * fit, weighted.best * fit
+            contact = hypothesis.contact_entry
+            if contact and self._taken_back(hypothesis, contact, evidence, now):
+                yield contact.before.node, partial(replace, contact.before), mass, best
+                continue
             open_to = self._open.of(hypothesis.state, hypothesis.node, now)
             for node, made, chance in advance.outcomes(hypothesis, open_to):
                 yield node, made, mass * chance, best * chance
+
+    def _taken_back(
+        self, hypothesis: TaskHypothesis, contact: ContactEntry, observe: Observe, now: float
+    ) -> bool:
+        """Whether the two in contact have only passed each other, or part as another course says.
+
+        A contact that has lasted for as long as its step requires is not taken back.
+        """
+        seen = observe(contact.step)
+        if seen.passed_since is not None:
+            return seen.passed_since - contact.at <= self.settings.contact_s
+        leaf = next((x for x in leaves(hypothesis.state) if x.step == contact.step), None)
+        if leaf is None or leaf.payload.fulfilled or seen.contrary is None:
+            return False
+        before = contact.before
+        courses = (t.entered for t in self._open.of(before.state, before.node, now))
+        return any(steps and all(_parts(observe(s), seen) for s in steps) for steps in courses)
 
     def _seen_anew(
         self, posterior: TaskHypotheses, observe: Observe, now: float
@@ -290,6 +312,11 @@ class MonitoredPhases:
         steps = [x.step for x in leaves(hypothesis.state)]
         worked = min(observe(s).elapsed(s, finished, now) for s in steps)
         return worked > self.settings.regret_s
+
+
+def _parts(step: ActionObservation, met: ActionObservation) -> bool:
+    """Whether a step has begun by what contradicts a contact."""
+    return step.entry is not None and step.entry == met.contrary
 
 
 def brought_along(asked: Sequence[Requirement]) -> Iterator[Requirement]:

@@ -15,6 +15,7 @@ from visup.tasks.automaton.automaton import END, NEW, Automaton, Transition, wit
 from visup.tasks.automaton.derivatives import begin, derivatives, enter
 from visup.tasks.automaton.states import Leaf, State, TaskStep, leaves
 from visup.tasks.grammar.nodes import Actors, Deadline, Task, Timed, walk
+from visup.tasks.supervision.hypotheses import ContactEntry, TaskHypothesis
 from visup.tasks.verification.observation import ActionObservation
 from visup.tasks.verification.step_model import Observe
 from visup.tasks.verification.step_monitor import BAD, StepMonitor, entered
@@ -85,6 +86,23 @@ class OpenTransition:
         if any(x.payload.status in BAD for x in self.left):
             return frozenset()
         return frozenset(x.step for x in self.left if _met_since(x, self.entered, observe))
+
+    @property
+    def completed(self) -> tuple[tuple[TaskStep, float | None], ...]:
+        """The steps that it completes, each with the time when it was first observed in seconds, or None."""
+        return tuple((x.step, x.payload.begun) for x in self.left)
+
+    def contact_entry(
+        self, hypothesis: TaskHypothesis, observe: Observe, now: float
+    ) -> ContactEntry | None:
+        """The contact by which a hypothesis takes it now; the last one if it takes it by something else.
+
+        A carried body counts as in contact only when it has slowed down: that is not taken back.
+        """
+        seen = ((s, observe(s)) for s in self.entered)
+        held = ((s, x.held_by) for s, x in seen if not x.carried)
+        met = next((s for s, h in held if h is not None and h.name in MEETINGS), None)
+        return ContactEntry.of(met, now, hypothesis) if met else hypothesis.contact_entry
 
     @property
     def share(self) -> float:

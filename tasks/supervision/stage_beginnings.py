@@ -2,34 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 from visup.agent import Mind, StageBelief, Status, TaskBelief
 from visup.agent.model.fast_replace import replace
 from visup.rules.relations.reasoner import sample_window
 from visup.tasks.automaton.states import TaskStep, leaves
-from visup.tasks.supervision.hypotheses import TaskHypotheses
+from visup.tasks.supervision.hypotheses import HOLD, TaskHypotheses
+from visup.tasks.supervision.memory import TaskMemory
 from visup.tasks.supervision.monitored_phases import MonitoredPhases
 from visup.tasks.supervision.snapshot import TaskSnapshot
-from visup.tasks.verification.motion_onset import moving_bodies
+from visup.tasks.verification.motion_onset import SETTING_OUT, moving_bodies
 from visup.tasks.verification.observe import TRENDS
 from visup.tasks.verification.stage_onset import stage_onset
 
+Resting = tuple[tuple[str, float], ...]
+"""Stages that wait to begin, each with the time since when its actors rest, seconds."""
+
+REST_S = 0.3
+"""How long the actors of a stage must have rested for their motion to begin it, seconds."""
+
 
 def with_begun(
-    before: tuple[StageBelief, ...], stages: tuple[StageBelief, ...], *, motion_seen: bool
+    before: tuple[StageBelief, ...], stages: tuple[StageBelief, ...], moved: Collection[str] = ()
 ) -> tuple[StageBelief, ...]:
     """Update whether each stage has begun.
 
     Args:
         before: The previous beliefs, in the same order.
         stages: The present beliefs.
-        motion_seen: Whether an actor of an active step starts to move, which begins the first stage of a
-            task.
+        moved: The stages that begin by motion of their actors, if they are active.
     """
-    motion_seen = motion_seen and is_first(before)
     pairs = zip(before, stages, strict=True)
-    return tuple([replace(s, begun=True) if _begun(b, s, motion_seen) else s for b, s in pairs])
+    return tuple(
+        [replace(s, begun=True) if _begun(b, s, s.stage in moved) else s for b, s in pairs]
+    )
 
 
 def is_first(stages: tuple[StageBelief, ...]) -> bool:
@@ -37,14 +44,14 @@ def is_first(stages: tuple[StageBelief, ...]) -> bool:
     return not any(s.begun for s in stages)
 
 
-def _begun(before: StageBelief, now: StageBelief, motion_seen: bool) -> bool:
+def _begun(before: StageBelief, now: StageBelief, moved: bool) -> bool:
     if now.status is Status.PENDING:
         return False
     if now.status is Status.PAUSED:
         return before.begun
     anew = before.status is Status.DONE and now.status is Status.ACTIVE
     return (
-        motion_seen
+        moved
         or now.begun
         or (before.begun and not anew)
         or now.status not in (Status.ACTIVE, Status.UNKNOWN)
@@ -87,7 +94,67 @@ CAME_LATER_S = 0.3
 begins a task."""
 
 
-def shows_motion(snapshot: TaskSnapshot, posterior: TaskHypotheses | None) -> bool:
+def begun_by_motion(
+    before: TaskMemory, resting: Resting, snapshot: TaskSnapshot, posterior: TaskHypotheses | None
+) -> frozenset[str]:
+    """The stages that begin since their actors start to move.
+
+    Any motion begins the first stage of a task. A later one begins when an actor sets out after all of them
+    have rested: a tug that leaves without its cart hauls it in vain.
+
+    Args:
+        before: The memory of the task before this step.
+        resting: The stages that wait at rest, as of this step.
+        snapshot: The observations.
+        posterior: The hypotheses.
+    """
+    if is_first(before.belief.stages):
+        names = frozenset(s.stage for s in before.belief.stages)
+        return names if _shows_motion(snapshot, posterior) else frozenset()
+    rested = {stage for stage, since in resting if snapshot.mind.time - since >= REST_S - 1e-9}
+    out = moving_bodies(snapshot.mind, SETTING_OUT) if rested else frozenset()
+    actors = _actors(posterior)
+    return frozenset(s for s in rested if not out.isdisjoint(snapshot.objects(actors.get(s, ()))))
+
+
+def stages_at_rest(
+    before: TaskMemory, snapshot: TaskSnapshot, posterior: TaskHypotheses | None
+) -> Resting:
+    """The stages that wait to begin and whose actors rest, or have just rested for long enough."""
+    waiting = {s.stage for s in before.belief.stages if s.status is Status.ACTIVE and not s.begun}
+    if not waiting or is_first(before.belief.stages):
+        return ()
+    now, since = snapshot.mind.time, dict(before.resting)
+    out, found = moving_bodies(snapshot.mind, SETTING_OUT), []
+    for stage, actors in _actors(posterior).items():
+        if stage not in waiting or not snapshot.found(actors):
+            continue
+        at = since.get(stage, now)
+        if out.isdisjoint(snapshot.objects(actors)) or now - at >= REST_S - 1e-9:
+            found.append((stage, at))
+    return tuple(found)
+
+
+def _actors(posterior: TaskHypotheses | None) -> dict[str, tuple[str, ...]]:
+    """The actors of each active stage that motion may begin.
+
+    It does not begin a stage that takes along what was grasped before: if the gripper moves alone, the grasp
+    has failed.
+    """
+    if posterior is None:
+        return {}
+    hypothesis, found = posterior.likeliest, dict[str, tuple[str, ...]]()
+    steps = [x.step for x in leaves(hypothesis.state)]
+    last = hypothesis.backpointer
+    grasped = set(last.step.actors) if last is not None and last.step.action == HOLD else {""}
+    taking = {s.stage for s in steps if s.action == "moving_together" and grasped <= {*s.actors}}
+    for step in steps:
+        if step.stage not in taking:
+            found[step.stage] = (*found.get(step.stage, ()), *step.actors)
+    return found
+
+
+def _shows_motion(snapshot: TaskSnapshot, posterior: TaskHypotheses | None) -> bool:
     """Whether actors of the most likely active steps start to move, or have just appeared.
 
     Of a stage with several steps, an actor of each must move; for a trend, the actor named first: that the

@@ -62,9 +62,9 @@ from visup.tasks.supervision.monitored_phases import MonitoredPhases
 from visup.tasks.supervision.replay import followed, newly_found, remembered, replayed
 from visup.tasks.supervision.snapshot import TaskSnapshot
 from visup.tasks.supervision.stage_beginnings import (
-    is_first,
-    shows_motion,
+    begun_by_motion,
     stage_onsets,
+    stages_at_rest,
     with_begun,
 )
 from visup.tasks.supervision.task_inference import ALONE, TaskActivity, updated_activities
@@ -92,11 +92,10 @@ def task_reasoner(
 
     Returns:
         A pure function of mind and observation. It updates `Mind.tasks`, one belief per task in order, stores
-        its memory under `MEMORY`, and gives events 'stage_started',
-        'stage_progressing', 'stage_paused', 'stage_resumed',
-        'stage_stalled', 'stage_failing', 'stage_failed', 'stage_done',
-        'stage_unknown', 'stage_revised', 'task_active', 'task_inactive', 'invariant_broken' and
-        'verdict', and alert conditions 'stage_failing' and 'invariant_broken'.
+        its memory under `MEMORY`, and gives events 'stage_started', 'stage_progressing', 'stage_paused',
+        'stage_resumed', 'stage_stalled', 'stage_failing', 'stage_failed', 'stage_done', 'stage_unknown',
+        'stage_revised', 'task_active', 'task_inactive', 'invariant_broken' and 'verdict', and alert
+        conditions 'stage_failing' and 'invariant_broken'.
     """
     known = actions or known_actions()
     return TaskReasoner(tuple(_model(t, known, settings) for t in tasks))
@@ -261,6 +260,7 @@ def _follow(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> TaskMemor
         violated=violated,
         familiar_objects=familiar,
         forbidden=memory.forbidden or interrupted_now,
+        resting=stages_at_rest(memory, snapshot, posterior),
         order_violation=order_violation(model, snapshot, posterior, memory.order_violation),
     )
     belief = _belief(model, snapshot, memory, new, bystanding)
@@ -284,11 +284,11 @@ def _belief(
         belief = out_of_order_belief(belief, old, new.order_violation.why, now)
     if memory.forbidden:
         belief = replace(belief, stages=old.stages, current=old.current)
-    motion_seen = is_first(old.stages) and shows_motion(snapshot, new.posterior)
+    moved = begun_by_motion(memory, new.resting, snapshot, new.posterior)
     least = model.settings.unexplained_s
     return replace(
         belief,
-        stages=with_begun(old.stages, belief.stages, motion_seen=motion_seen),
+        stages=with_begun(old.stages, belief.stages, moved),
         unexplained=tuple(i for i, since in new.unexplained_since if now - since >= least),
         bystanders=bystanding,
         machines=machines(model.task, snapshot.bindings),
@@ -339,8 +339,10 @@ def _events(
     if not new.activity.reportable and memory.activity.reportable:
         return  # the end of its activity is the only event
     onsets = dict(stage_onsets(model, memory.belief, new.belief, new.posterior, mind))
-    yield from stage_events(memory.belief, new.belief, mind, model.task, onsets)
-    yield from revision_events(memory.belief, new.belief, _revised(memory, new), mind)
+    revisions = _revised(memory, new)
+    revised = {r.step.stage for r in revisions}
+    yield from stage_events(memory.belief, new.belief, mind, model.task, onsets, revised)
+    yield from revision_events(memory.belief, new.belief, revisions, mind)
     yield from invariant_events(model, memory, new, mind)
 
 

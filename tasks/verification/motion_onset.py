@@ -30,16 +30,25 @@ swaying camera moves all bodies alike, but for parallax."""
 MOVING_SIGMAS = 3.0
 """Least speed of a moving body, in standard deviations of its velocity."""
 
+SETTING_OUT = 0.0125
+"""Least speed of a body that sets out, image diagonals per second: one that only shifts is slower."""
+
 Mask = NDArray[np.bool_]
 
 
-def moving_bodies(mind: Mind) -> frozenset[int]:
-    """Ids of the bodies that move by themselves now, as a whole or in part."""
+def moving_bodies(mind: Mind, least: float = 0.0) -> frozenset[int]:
+    """Ids of the bodies that move by themselves now, as a whole or in part.
+
+    Args:
+        mind: The mind.
+        least: Least speed of one that moves as a whole, image diagonals per second, if that is more than the
+            greatest of a body at rest.
+    """
     diagonal = image_diagonal(mind.frame_size)
     now, window = kinematics(mind), sample_window(mind)
     if window.ids != now.ids or not len(window.times):
         return frozenset()
-    moving_slowly = moving(now, relation_settings(mind).still_speed * diagonal)
+    moving_slowly = moving(now, max(least, relation_settings(mind).still_speed) * diagonal)
     moving_slowly &= moving_more_than_others(window)
     is_moving = moving_slowly | advancing_outlines(window, MIN_ADVANCE * diagonal)
     return frozenset(i for i, moves in zip(now.ids, is_moving.tolist(), strict=True) if moves)

@@ -34,6 +34,8 @@ class ActionObservation:
         unreached: Time since when an approach, or carrying, is over without having reached its goal, or None.
         distance: Gap between the outlines of its two actors, pixels; None if unknown, or without two actors.
         carried_past: Whether it would begin by a contact, but one actor is only carried past the other.
+        carried: Whether either of its actors is held by a third object.
+        passed_since: If it begins by a contact, but one actor passes the other: since when, seconds; or None.
     """
 
     holds: Truth = Truth.UNKNOWN
@@ -51,6 +53,8 @@ class ActionObservation:
     absent: bool = False
     moves_on: bool = False
     carried_past: bool = False
+    carried: bool = False
+    passed_since: float | None = None
     unreached: float | None = None
     distance: float | None = None
 

@@ -9,7 +9,6 @@ from types import MappingProxyType
 
 from visup.agent import Mind, Presence, Relation, Truth
 from visup.agent.model.fast_replace import replace
-from visup.rules.coupling.contact import ContactSettings
 from visup.rules.formula.truth import truth_if
 from visup.rules.geometry.regions import image_diagonal
 from visup.rules.predicates.snapshot import Snapshot
@@ -31,7 +30,9 @@ from visup.tasks.verification.passing import (
     goes_round,
     holds_on,
     moves_on,
+    passed_since,
     put_down,
+    slow,
     still_meet,
     stopped_at,
     went_past,
@@ -116,11 +117,7 @@ class RelationLookup:
 
     def _rests(self, objects: tuple[int, ...]) -> bool:
         """Whether one body has come to rest relative to the other, even if it is out of sight since."""
-        speed = kinematics(self.mind).pair("relative_speed", *objects)
-        slow = speed < ContactSettings().passing * image_diagonal(self.mind.frame_size)
-        rest = self.lasting(
-            "rests", objects, Truth.UNKNOWN if math.isnan(speed) else truth_if(slow)
-        )
+        rest = self.lasting("rests", objects, slow(self.mind, objects))
         return rest.truth is Truth.TRUE and self.time - rest.since >= REST_S - 1e-9
 
     def passes_by(self, objects: tuple[int, ...]) -> bool:
@@ -288,20 +285,22 @@ def observe(
     unreached = relations.unreached(meaning.name, ids, contrary)
     if contrary is not None and relations.explains_away(contrary, meaning.name, ids):
         contrary = None
-    known = (*meaning.helps, *meaning.contrary)
     entry, new_trend = relations.begun(meaning.begins, ids)
+    by_contact = not set(CONTACTS).isdisjoint(meaning.begins)
     return ActionObservation(
         holds=holds,
         held_by=held_by,
         helps=helps,
         entry=entry,
         contrary=contrary,
-        observed=relations.known(known, ids),
+        observed=relations.known((*meaning.helps, *meaning.contrary), ids),
         new_trend=new_trend,
         round=entry is not None and entry.name in TRENDS and relations.goes_round(entry.name, ids),
         moves_on=held_by is not None and held_by.name in CONTACTS and moves_on(relations.mind, ids),
         unreached=unreached,
-        carried_past=not set(CONTACTS).isdisjoint(meaning.begins) and relations.carried_past(ids),
+        carried=bool(holds_on(relations.mind, ids)),
+        carried_past=by_contact and relations.carried_past(ids),
+        passed_since=passed_since(relations.mind, ids) if by_contact else None,
     )
 
 

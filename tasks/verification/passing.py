@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.agent import Mind, Relation, Truth
-from visup.rules.coupling.contact import OutlineContact
+from visup.rules.coupling.contact import ContactSettings, OutlineContact
 from visup.rules.coupling.evidence import COUPLING, smaller_size
+from visup.rules.formula.truth import truth_if
 from visup.rules.geometry.regions import DIRECTIONS, Floats, image_diagonal
 from visup.rules.presence.object_tracks import presence_memory
 from visup.rules.relations.reasoner import kinematics, sample_window
@@ -71,6 +72,25 @@ def goes_past(
         # size of the smaller one.
         return on and contact is not None and contact.path > smaller_size(objects, mind)
     return mind.truth("passing_by", *objects) is Truth.TRUE and not rests(objects)
+
+
+def passed_since(mind: Mind, objects: tuple[int, ...]) -> float | None:
+    """Time since when one of two bodies has been passing the other, by their outlines as well, or None.
+
+    Something that moves over a body at rest may be mistaken for motion of that body, not of its outline. None
+    also for a carried body, which has a rule of its own (`goes_past`).
+    """
+    passing = mind.relation("passing_by", *objects)
+    if passing is None or passing.truth is not Truth.TRUE or holds_on(mind, objects):
+        return None
+    return passing.since if slow(mind, objects) is Truth.FALSE else None
+
+
+def slow(mind: Mind, objects: tuple[int, ...]) -> Truth:
+    """Whether two bodies hardly move relative to each other now."""
+    speed = kinematics(mind).pair("relative_speed", *objects)
+    least = ContactSettings().passing * image_diagonal(mind.frame_size)
+    return Truth.UNKNOWN if math.isnan(speed) else truth_if(speed < least)
 
 
 def moves_on(mind: Mind, objects: tuple[int, ...]) -> bool:

@@ -120,7 +120,7 @@ def test_a_stage_reported_done_is_revised_when_later_evidence_contradicts_it() -
     revisions = [e for e in played.events if e.kind == "stage_revised"]
     assert [e.data["stage"] for e in revisions] == ["approach"]
     assert "reported complete at 5." in revisions[0].text
-    assert "is now believed not to have happened" in revisions[0].text
+    assert "is now believed still to be going on" in revisions[0].text
     assert not [e for e in watch(*SUCCEEDS).events if e.kind == "stage_revised"]
 
 

@@ -208,8 +208,8 @@ def test_conclusions_that_later_evidence_contradicts_are_revised() -> None:
     revised = taken_back(beliefs)
     assert [r.step.stage for r in revised] == ["one"]
     assert 1.0 < revised[0].reported < revised[0].revised
-    assert "`one`, reported complete at" in str(revised[0])
-    assert "now believed not to have happened" in str(revised[0])
+    assert "`one`, reported complete at" in revised[0].text()
+    assert "now believed not to have happened" in revised[0].text()
     steady = followed(hidden_filter(read(task)), "bbbbbbccccc")
     assert not taken_back(steady)
 

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
 import pytest
 
 from tests.tasks.scripted import ARM, IDENTITIES, INTRUDER, SATELLITE, RelationSpan, Script, watch
+from tests.tasks.supervision.drawn import Mask, drawn, first, watched
 from visup.tasks.supervision import stage_beginnings
 
 APPROACH = "<t> ::= converging(arm, satellite)"
@@ -140,3 +145,49 @@ def test_a_continuing_action_is_dated_to_the_end_of_the_previous_stage() -> None
     script = Script((RelationSpan("converging", 0.5, 2.0), keeps, drifts))
     reported, began = dated(script, text)["away"]
     assert 5.0 - 0.11 <= began <= reported
+
+
+HAUL = """
+<fetch>    ::= <approach> <coupling> <haul>
+<approach> ::= converging(tug, cart)
+<coupling> ::= touching(tug, cart)
+<haul>     ::= moving_together(tug, cart) & moving(cart)
+"""
+ARRIVES_S, LEAVES_S, TUG, CART = 3.0, 5.0, 1, 2
+
+
+def fetching(now: float, back: float, leaves_s: float = LEAVES_S) -> Mask:
+    """A tug that drives to a cart, stands there, and leaves without it at a speed."""
+    x = 20.0 + 60.0 * min(now, ARRIVES_S) - back * max(0.0, now - leaves_s)
+    return drawn({CART: (260, 100, 60, 50), TUG: (x, 100, 60, 50)})
+
+
+def haul(folder: Path, mask: Callable[[float], Mask], until: float) -> float | None:
+    """When the haul is reported to begin, after the coupling."""
+    events = watched(folder, HAUL, mask, {"tug": TUG, "cart": CART}, until)
+    assert first(events, "stage_started", "coupling") is not None
+    return first(events, "stage_started", "haul")
+
+
+def test_a_stage_begins_when_an_actor_that_has_rested_sets_out(tmp_path: Path) -> None:
+    leaves = partial(fetching, back=40.0)
+    assert haul(tmp_path, leaves, LEAVES_S + 1.0) == pytest.approx(LEAVES_S + 0.3, abs=0.3)
+
+
+def test_actors_at_rest_begin_no_stage(tmp_path: Path) -> None:
+    assert haul(tmp_path, partial(fetching, back=0.0), LEAVES_S + 1.0) is None
+
+
+def test_an_actor_that_has_not_rested_begins_no_stage(tmp_path: Path) -> None:
+    """What turns back at once may only have come into contact."""
+    turns = partial(fetching, back=40.0, leaves_s=ARRIVES_S + 0.4)
+    assert haul(tmp_path, turns, ARRIVES_S + 0.9) is None
+
+
+def test_a_gripper_that_leaves_alone_has_not_begun_to_take_anything_along(tmp_path: Path) -> None:
+    text = HAUL.replace("<coupling> ::= touching", "<coupling> ::= coupled")
+    mask = partial(fetching, back=40.0)
+    events = watched(tmp_path, text, mask, {"tug": TUG, "cart": CART}, LEAVES_S + 3.0)
+    assert first(events, "stage_done", "coupling") is not None
+    assert first(events, "stage_started", "haul") is None
+    assert any(e.kind == "stage_failing" for e in events)
