@@ -6,9 +6,15 @@ from functools import partial
 
 import pytest
 
-from tests.tasks.scripted import RelationSpan, Script, ScriptedRun, watch
+from tests.tasks.scripted import ARM, INTRUDER, SATELLITE, RelationSpan, Script, ScriptedRun, watch
 from tests.tasks.supervision.drawn import Mask, drawn, watched
-from visup.agent import Event, Verdict
+from visup.agent import Event, Relation, Truth, Verdict
+from visup.tasks.automaton.automaton import Transition
+from visup.tasks.automaton.states import Leaf, TaskStep
+from visup.tasks.supervision.hypotheses import TaskHypothesis
+from visup.tasks.supervision.open_transitions import OpenTransition
+from visup.tasks.verification.observation import ActionObservation
+from visup.tasks.verification.step_monitor import entered
 
 CRANE, TRUCK = 1, 2
 SET_DOWN = """
@@ -97,3 +103,28 @@ def test_what_has_lasted_as_long_as_required_is_not_taken_back() -> None:
     run = docking(2.6)
     assert kinds(run, "docked")[:3] == ["stage_started", "stage_progressing", "stage_done"]
     assert "stage_started" not in kinds(run, "back_off")
+
+
+def test_another_course_counts_only_if_it_begins_by_the_parting() -> None:
+    """That somebody else comes near just then is no reason for the two to part."""
+    text = RETRY.replace("diverging(arm, satellite)", "converging(dish, satellite)")
+    spans = (
+        RelationSpan("converging", 1.0, 4.2),
+        RelationSpan("touching", 4.0, 5.0),
+        RelationSpan("diverging", 5.0, 9.0),
+        RelationSpan("converging", 4.4, 9.0, objects=(SATELLITE, INTRUDER)),
+    )
+    objects = {ARM: (0.0, 1e9), SATELLITE: (0.0, 1e9), INTRUDER: (0.0, 1e9)}
+    run = watch(Script(spans, objects), 5.7, f"actor dish is dish\n{text}", fps=10.0)
+    assert "stage_revised" not in [e.kind for e in run.events]
+
+
+@pytest.mark.parametrize("carried", [False, True])
+def test_the_contact_of_a_carried_body_is_kept(carried: bool) -> None:
+    step = TaskStep("touching", ("part", "fixture"), "place")
+    state = Leaf(step, entered(0.0))
+    touches = Relation("touching", (1, 2), Truth.TRUE, 0.5)
+    seen = ActionObservation(held_by=touches, carried=carried)
+    taken = OpenTransition(Transition(0, (), (), 1.0), (), (step,), None)
+    entry = taken.contact_entry(TaskHypothesis(state, 0), lambda s: seen, 1.0)
+    assert (entry is None) is carried
