@@ -174,8 +174,9 @@ def test_a_stage_begins_when_an_actor_that_has_rested_sets_out(tmp_path: Path) -
     assert haul(tmp_path, leaves, LEAVES_S + 1.0) == pytest.approx(LEAVES_S + 0.3, abs=0.3)
 
 
-def test_actors_at_rest_begin_no_stage(tmp_path: Path) -> None:
-    assert haul(tmp_path, partial(fetching, back=0.0), LEAVES_S + 1.0) is None
+@pytest.mark.parametrize("back", [0.0, 4.0])
+def test_actors_that_rest_or_only_shift_begin_no_stage(tmp_path: Path, back: float) -> None:
+    assert haul(tmp_path, partial(fetching, back=back), LEAVES_S + 1.0) is None
 
 
 def test_an_actor_that_has_not_rested_begins_no_stage(tmp_path: Path) -> None:
