@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 from visup.agent import Binding, Mind, Relation, Truth
 from visup.agent.model.fast_replace import replace
 from visup.tasks.automaton.states import TaskStep
 from visup.tasks.grammar.conditions import Condition
 from visup.tasks.grammar.nodes import Hold
 from visup.tasks.supervision.monitored_phases import MonitoredPhases
+from visup.tasks.verification.motion_onset import SETTING_OUT, moving_bodies
 from visup.tasks.verification.observation import NO_MEMORY, ActionObservation, ObservationMemory
 from visup.tasks.verification.observe import RelationLookup
 from visup.tasks.verification.observe import observe as observe_action
@@ -81,6 +84,11 @@ class TaskSnapshot:
         return replace(
             seen, holds=Truth.TRUE, held_by=contact, helps=contact, entry=contact, observed=True
         )
+
+    @cached_property
+    def setting_out(self) -> frozenset[int]:
+        """Ids of the bodies that move now, fast enough to have set out."""
+        return moving_bodies(self.mind, SETTING_OUT)
 
     def holds(self, condition: Condition, lasting: Hold | None) -> Truth:
         """Whether a condition holds, and has for the required time."""

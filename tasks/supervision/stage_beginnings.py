@@ -12,7 +12,7 @@ from visup.tasks.supervision.hypotheses import HOLD, TaskHypotheses
 from visup.tasks.supervision.memory import TaskMemory
 from visup.tasks.supervision.monitored_phases import MonitoredPhases
 from visup.tasks.supervision.snapshot import TaskSnapshot
-from visup.tasks.verification.motion_onset import SETTING_OUT, moving_bodies
+from visup.tasks.verification.motion_onset import moving_bodies
 from visup.tasks.verification.observe import TRENDS
 from visup.tasks.verification.stage_onset import stage_onset
 
@@ -112,9 +112,8 @@ def begun_by_motion(
         names = frozenset(s.stage for s in before.belief.stages)
         return names if _shows_motion(snapshot, posterior) else frozenset()
     rested = {stage for stage, since in resting if snapshot.mind.time - since >= REST_S - 1e-9}
-    out = moving_bodies(snapshot.mind, SETTING_OUT) if rested else frozenset()
-    actors = _actors(posterior)
-    return frozenset(s for s in rested if not out.isdisjoint(snapshot.objects(actors.get(s, ()))))
+    actors = {s: snapshot.objects(a) for s, a in _actors(posterior).items() if s in rested}
+    return frozenset(s for s, ids in actors.items() if not snapshot.setting_out.isdisjoint(ids))
 
 
 def stages_at_rest(
@@ -125,12 +124,12 @@ def stages_at_rest(
     if not waiting or is_first(before.belief.stages):
         return ()
     now, since = snapshot.mind.time, dict(before.resting)
-    out, found = moving_bodies(snapshot.mind, SETTING_OUT), []
+    found = []
     for stage, actors in _actors(posterior).items():
         if stage not in waiting or not snapshot.found(actors):
             continue
         at = since.get(stage, now)
-        if out.isdisjoint(snapshot.objects(actors)) or now - at >= REST_S - 1e-9:
+        if snapshot.setting_out.isdisjoint(snapshot.objects(actors)) or now - at >= REST_S - 1e-9:
             found.append((stage, at))
     return tuple(found)
 
