@@ -4,6 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 COMPILED := $(VENV)/.compiled
+WHEEL := build/wheel-folder
 
 # The tests start hundreds of processes: each would read all of visup's source anew.
 unexport PYTHONDONTWRITEBYTECODE
@@ -43,9 +44,9 @@ check: $(STAMP)
 	$(BIN)/bandit -q -c pyproject.toml -r agent percepts rules tasks visup
 	$(BIN)/python -m tests.supply_chain
 
-# Damaged and hostile files of every kind, for a minute; `make bench` takes longer.
+# Damaged and hostile files of every kind, for half a minute; `make bench` takes longer.
 fuzz: setup
-	$(BIN)/visup eval hardening --count 150 --cuts 100 --seed 0
+	$(BIN)/visup eval hardening --count 60 --cuts 30 --seed 0
 
 oracles: setup
 	$(BIN)/python -m tests.oracles
@@ -61,8 +62,11 @@ docs: $(STAMP)
 	@echo 'Documentation: site/index.html'
 
 # Built from the sdist, it works in a clean environment, and for a user who may write nowhere.
-wheel:
-	.ci/wheel
+wheel: $(WHEEL) setup
+	.ci/wheel try
+
+$(WHEEL):
+	.ci/wheel build
 
 clean:
 	rm -rf $(VENV) build dist site *.egg-info demo-run runs .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -8,9 +8,11 @@ number of threads, and sums are taken in the order that is written: no reorderin
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeVar, cast
+from pathlib import Path
+from typing import Any, TypeVar, cast
 
 import numba
+from numba.core.caching import CompileResultCacheImpl, FunctionCache
 
 _uncached: list[str] = []
 
@@ -40,7 +42,52 @@ def compiled(function: Function) -> Function:
     """
     try:
         return cast(Function, numba.njit(cache=True, nogil=True)(function))
-    except RuntimeError:
-        # Neither beside the code nor in the user's folders may anything be written: each run compiles.
+    except (
+        RuntimeError
+    ):  # neither beside the code nor in the user's folders may anything be written
+        return cast(Function, _compiled_by_another(function))
+
+
+def _compiled_by_another(function: Callable[..., object]) -> Any:
+    """What whoever installed visup has compiled, and what this user has to compile in each run."""
+    dispatcher: Any = numba.njit(nogil=True)(function)
+    try:
+        dispatcher._cache = _InstalledCache(function)  # type: ignore[no-untyped-call]
+    except RuntimeError:  # they have never run it
         _uncached.append(function.__name__)
-        return cast(Function, numba.njit(nogil=True)(function))
+    return dispatcher
+
+
+_beside_the_code = next(
+    c for c in CompileResultCacheImpl._locator_classes if "InTree" in c.__name__
+)
+
+
+class _ReadableFolder(_beside_the_code):  # type: ignore[misc, valid-type]
+    """Finds compiled loops beside the code, where nothing need be written."""
+
+    def ensure_cache_path(self) -> None:
+        if not Path(self.get_cache_path()).is_dir():
+            raise FileNotFoundError(self.get_cache_path())
+
+
+class _InstalledImpl(CompileResultCacheImpl):
+    _locator_classes = [_ReadableFolder]  # noqa: RUF012
+
+
+class _InstalledCache(FunctionCache):
+    """Compiled loops that are read and never written."""
+
+    _impl_class = _InstalledImpl
+
+    def load_overload(self, sig: Any, target_context: Any) -> object:
+        try:
+            found: object = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+        except PermissionError:
+            found = None
+        if found is None:
+            _uncached.append(self._py_func.__name__)
+        return found
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Nothing: it could not be written."""

@@ -15,41 +15,39 @@ import pytest
 from tests.paths import ROOT
 
 NOBODY = 65534
+AS_NOBODY = ("setpriv", "--reuid", str(NOBODY), "--regid", str(NOBODY), "--clear-groups")
+
+pytestmark = pytest.mark.skipif(
+    os.geteuid() != 0 or shutil.which("setpriv") is None,
+    reason="only root can become somebody who may write nowhere",
+)
 
 
 @pytest.fixture
 def place() -> Iterator[Path]:
-    """A folder that others may look into; those of pytest they may not."""
-    with tempfile.TemporaryDirectory() as folder:
-        Path(folder).chmod(0o755)
-        yield Path(folder)
+    """A folder that others may look into (those of pytest they may not), with a copy of visup's code.
+
+    The code was never compiled, as the site-packages of somebody else.
+    """
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        folder.chmod(0o755)
+        (folder / "home").mkdir(mode=0o555)
+        ignored = shutil.ignore_patterns("__pycache__", ".*", "docs", "tests", "examples")
+        shutil.copytree(ROOT, folder / "code", symlinks=True, ignore=ignored)
+        yield folder
 
 
-@pytest.mark.skipif(
-    os.geteuid() != 0 or shutil.which("setpriv") is None,
-    reason="only root can become somebody who may write nowhere",
-)
-def test_visup_can_be_imported_on_a_read_only_disk(place: Path) -> None:
-    home, folder, code = place / "home", place / "folder", place / "code"
-    for path in (home, folder):
-        path.mkdir()
-    home.chmod(0o555)
-    os.chown(folder, NOBODY, NOBODY)
-    # A copy that was never compiled: as site-packages of somebody else.
-    ignored = shutil.ignore_patterns("__pycache__", ".*", "docs", "tests", "examples")
-    shutil.copytree(ROOT, code, symlinks=True, ignore=ignored)
+def answer(place: Path, program: str, *user: str) -> str:
+    """What a program prints that is run by a user without a home of their own."""
     environment = {k: v for k, v in os.environ.items() if not k.startswith(("NUMBA", "XDG"))}
-    if subprocess.run(
-        as_nobody(sys.executable, "-c", ""), check=False, capture_output=True
-    ).returncode:
-        pytest.skip("the interpreter itself cannot be read by others here")
     done = subprocess.run(
-        as_nobody(sys.executable, "-c", LOADED),
-        cwd=folder,
+        [*user, sys.executable, "-c", program],
+        cwd=place,
         env={
             **environment,
-            "HOME": str(home),
-            "PYTHONPATH": str(code),
+            "HOME": str(place / "home"),
+            "PYTHONPATH": str(place / "code"),
             "PYTHONDONTWRITEBYTECODE": "1",
         },
         capture_output=True,
@@ -57,18 +55,41 @@ def test_visup_can_be_imported_on_a_read_only_disk(place: Path) -> None:
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    assert "compiled anew" in done.stdout
-    assert "NUMBA_CACHE_DIR" in done.stdout
+    return done.stdout
 
 
-LOADED = """
-import visup.runs.runner
-from visup.compiled import cache_note
-print(cache_note())
+@pytest.fixture(autouse=True)
+def _readable_interpreter(place: Path) -> None:
+    if subprocess.run(
+        [*AS_NOBODY, sys.executable, "-c", ""], check=False, capture_output=True
+    ).returncode:
+        pytest.skip("the interpreter itself cannot be read by others here")
+
+
+def test_visup_can_be_imported_on_a_read_only_disk(place: Path) -> None:
+    # All that a run loads; `.ci/run` has such a user replay a whole run.
+    told = answer(
+        place,
+        "import visup.runs.runner\nfrom visup.compiled import cache_note\nprint(cache_note())",
+        *AS_NOBODY,
+    )
+    assert "compiled anew" in told
+    assert "NUMBA_CACHE_DIR" in told
+
+
+def test_loops_that_another_user_has_compiled_are_read(place: Path) -> None:
+    (place / "code" / "sums.py").write_text(SUMS)
+    whole = "import sums; print(sums.added(1, 2), sums.cache_note())"
+    answer(place, whole)
+    assert answer(place, whole, *AS_NOBODY) == "3 None\n"
+    other = answer(place, whole.replace("1, 2", "0.5, 2"), *AS_NOBODY)
+    assert other.startswith("2.5 Hot loops are compiled anew")
+
+
+SUMS = """
+from visup.compiled import cache_note, compiled
+
+@compiled
+def added(a, b):
+    return a + b
 """
-"""All that a run loads; `.ci/run` has such a user replay a whole run."""
-
-
-def as_nobody(*command: str) -> list[str]:
-    who = ["--reuid", str(NOBODY), "--regid", str(NOBODY), "--clear-groups"]
-    return ["setpriv", *who, *command]
