@@ -33,6 +33,9 @@ MOVING_SIGMAS = 3.0
 SETTING_OUT = 0.0125
 """Least speed of a body that sets out, image diagonals per second: one that only shifts is slower."""
 
+NEAR = 0.05
+"""Distance at which a body that moves may cover or shade another one, image diagonals."""
+
 Mask = NDArray[np.bool_]
 
 
@@ -48,14 +51,29 @@ def moving_bodies(mind: Mind, least: float = 0.0) -> frozenset[int]:
     now, window = kinematics(mind), sample_window(mind)
     if window.ids != now.ids or not len(window.times):
         return frozenset()
-    moving_slowly = moving(now, max(least, relation_settings(mind).still_speed) * diagonal)
-    moving_slowly &= moving_more_than_others(window)
+    still = max(least, relation_settings(mind).still_speed)
+    limits = np.where(near_movers(now, diagonal), max(still, SETTING_OUT), still) * diagonal
+    moving_slowly = moving(now, limits) & moving_more_than_others(window)
     is_moving = moving_slowly | advancing_outlines(window, MIN_ADVANCE * diagonal)
     return frozenset(i for i, moves in zip(now.ids, is_moving.tolist(), strict=True) if moves)
 
 
-def moving(now: Kinematics, still: float) -> Mask:
-    """(M,) bool: the bodies that move faster than `still`, pixels per second, and than noise explains."""
+def near_movers(now: Kinematics, diagonal: float) -> Mask:
+    """(M,) bool: bodies beside others that are not known to be slow, which may cover or shade them."""
+    with np.errstate(invalid="ignore"):
+        fast = ~(now.speed < SETTING_OUT * diagonal)
+        near = now.gap < NEAR * diagonal
+    np.fill_diagonal(near, False)
+    return np.asarray((near & fast).any(axis=1))
+
+
+def moving(now: Kinematics, still: Floats) -> Mask:
+    """(M,) bool: the bodies that move faster than `still`, pixels per second, and than noise explains.
+
+    Args:
+        now: The present quantities.
+        still: (M,) greatest speed of each body at rest, pixels per second.
+    """
     with np.errstate(invalid="ignore"):
         return np.asarray(now.speed > np.maximum(still, MOVING_SIGMAS * now.velocity_sigma))
 
