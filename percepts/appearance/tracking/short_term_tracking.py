@@ -13,7 +13,7 @@ from visup.percepts.appearance.models.appearance_model import Appearance
 from visup.percepts.appearance.models.pose import Doubles, PatchPose
 from visup.percepts.appearance.models.scene import Scene
 from visup.percepts.appearance.tracking.adaptation import PATH_S
-from visup.percepts.appearance.tracking.track import MATCHING_SCORE, TaughtObjectTrack, TrackState
+from visup.percepts.appearance.tracking.track import TaughtObjectTrack, TrackState
 from visup.percepts.appearance.tracking.verification import (
     colour_agreement,
     explained_pixels,
@@ -88,10 +88,7 @@ def track_object(track: TaughtObjectTrack, owner: int, motion: FrameMotion) -> T
 def with_observation(track: TaughtObjectTrack, time: float, pose: PatchPose) -> TaughtObjectTrack:
     """The track with an observation at a pose and time (seconds) added to its path."""
     path = tuple(p for p in track.path if time - p[0] <= PATH_S)
-    matched = time if track.score >= MATCHING_SCORE else track.last_matched
-    return replace(
-        track, pose=pose, path=(*path, (time, pose)), last_seen=time, last_matched=matched
-    )
+    return replace(track, pose=pose, path=(*path, (time, pose)), last_seen=time)
 
 
 def _track_at_rest(

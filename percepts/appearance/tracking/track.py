@@ -27,12 +27,6 @@ class TrackState(StrEnum):
 IN_VIEW = (TrackState.MOVING, TrackState.RESTING)
 
 
-MATCHING_SCORE = 0.3
-"""Score from which an observation looks as expected."""
-DOUBT_S = 0.4
-"""How long an object is followed that looks otherwise before it is sought elsewhere, too, seconds."""
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class RestMemory:
     """The pixels of an object at rest, to be compared with later frames.
@@ -64,7 +58,6 @@ class TaughtObjectTrack:
         explained_share: Share of its pixels that looked as expected.
         colour_excess: Excess of its colours over those of the surroundings.
         last_seen: Time of the last observation, seconds.
-        last_matched: Time of the last observation that looked as expected, seconds.
         first_seen: Time of the first observation, seconds.
         confirmed: Whether it has clearly matched a taught view.
         compared_at: Time of the last search of the whole image for it, seconds.
@@ -84,20 +77,10 @@ class TaughtObjectTrack:
     explained_share: float = 0.0
     colour_excess: float = 0.0
     last_seen: float = -np.inf
-    last_matched: float = -np.inf
     first_seen: float = 0.0
     confirmed: bool = False
     compared_at: float = -np.inf
     instance: int = 1
-
-    @property
-    def score(self) -> float:
-        """How well its last observation matched, 0 to 1 (`Match.score`)."""
-        return float(np.sqrt(np.clip(self.peak, 0, 1) * self.explained_share))
-
-    def is_doubtful(self, time: float) -> bool:
-        """Whether it has been followed for long though it looks otherwise, at a time in seconds."""
-        return self.state is TrackState.MOVING and time - self.last_matched > DOUBT_S
 
     @property
     def key(self) -> str:

@@ -198,22 +198,18 @@ class TaughtObjectTracker:
         that was detected before is searched by its last appearance instead: a moving body with its colours
         may be another object that was in view all the time.
         """
-        doubtful = {t.key for t in self.tracks if t.is_doubtful(scene.time)}
-        absent = (t for t in self.tracks if t.state not in IN_VIEW or t.key in doubtful)
-        lost = sorted(absent, key=lambda t: t.compared_at)
+        lost = sorted(
+            (t for t in self.tracks if t.state not in IN_VIEW), key=lambda t: t.compared_at
+        )
         first = self._count == 1
         searched = lost if first else lost[: self._count % SEARCH_INTERVAL == 0]
         names = {t.key for t in searched}
-        candidates = [
-            c
-            for c in self._search_image(scene, searched)
-            if c.name not in doubtful or c.match.score > SURE
-        ]
+        candidates = self._search_image(scene, searched)
         new = {t.key for t in lost if not t.id}
         taken = [
             (b, self.views[t.view_number].appearance)
             for t in self.tracks
-            if t.state in IN_VIEW and t.key not in names & doubtful
+            if t.state in IN_VIEW
             for b in occupied_blobs(t, scene)
         ]
         # What matches only where another object is has not been found.
