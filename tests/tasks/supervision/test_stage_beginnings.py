@@ -192,3 +192,23 @@ def test_a_gripper_that_leaves_alone_has_not_begun_to_take_anything_along(tmp_pa
     assert first(events, "stage_done", "coupling") is not None
     assert first(events, "stage_started", "haul") is None
     assert any(e.kind == "stage_failing" for e in events)
+
+
+STACK = "<t> ::= converging(block, base)"
+BLOCK, BASE, GRIPPER, SHIFTS_S = 1, 2, 3, 1.0
+
+
+def shifting(now: float, gripper: bool) -> Mask:
+    """A block whose outline shifts slowly, beside a gripper that sweeps past it, or alone."""
+    shift = 3.0 * max(0.0, now - SHIFTS_S)
+    boxes = {BLOCK: (100 + shift, 150, 40, 40), BASE: (280, 150, 30, 40)}
+    if gripper:
+        boxes[GRIPPER] = (40 + 60.0 * now, 100, 40, 40)
+    return drawn(boxes)
+
+
+@pytest.mark.parametrize("gripper", [False, True])
+def test_what_shifts_beside_a_mover_begins_no_stage(tmp_path: Path, gripper: bool) -> None:
+    roles = {"block": BLOCK, "base": BASE, "gripper": GRIPPER}
+    events = watched(tmp_path, STACK, partial(shifting, gripper=gripper), roles, SHIFTS_S + 0.9)
+    assert (first(events, "stage_started", "t") is None) is gripper

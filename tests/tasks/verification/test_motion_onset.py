@@ -8,8 +8,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from visup.rules.geometry.regions import DIRECTIONS, FAN, Floats
+from visup.rules.relations.kinematics import Kinematics
+from visup.rules.relations.rows import PairQuantity
 from visup.rules.relations.samples import SampleWindow
-from visup.tasks.verification.motion_onset import LAG_S, advancing_outlines, moving_more_than_others
+from visup.tasks.verification.motion_onset import (
+    LAG_S,
+    NEAR,
+    SETTING_OUT,
+    advancing_outlines,
+    moving_more_than_others,
+    near_movers,
+)
 
 TIMES = np.arange(0.0, 1.0, 0.1)
 LIMIT = 7.0
@@ -104,3 +113,30 @@ def test_a_short_history_shows_no_motion() -> None:
     reach = resting(2)[:3]
     reach[2, 0] += 30.0
     assert not advancing_outlines(window(reach), LIMIT).any()
+
+
+DIAGONAL = 600.0
+unknown = st.just(float("nan"))
+
+
+@given(
+    st.lists(st.floats(0, 4 * SETTING_OUT * DIAGONAL) | unknown, min_size=1, max_size=4),
+    st.lists(st.floats(0, 3 * NEAR * DIAGONAL) | unknown, min_size=6, max_size=6),
+)
+def test_beside_a_mover_is_what_is_near_another_body_not_known_to_be_slow(
+    speeds: list[float], gaps: list[float]
+) -> None:
+    count = len(speeds)
+    tables = np.full((5, count, count), np.nan)
+    free = iter(gaps)
+    expected = [False] * count
+    for i in range(count):
+        tables[PairQuantity.GAP, i, i] = 0.0
+        for j in range(i + 1, count):
+            gap = next(free)
+            tables[PairQuantity.GAP, [i, j], [j, i]] = gap
+            for a, b in ((i, j), (j, i)):
+                slow = speeds[b] < SETTING_OUT * DIAGONAL
+                expected[a] |= gap < NEAR * DIAGONAL and not slow
+    now = Kinematics(tuple(range(count)), tables, speed=np.array(speeds))
+    assert near_movers(now, DIAGONAL).tolist() == expected
