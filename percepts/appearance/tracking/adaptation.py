@@ -122,7 +122,9 @@ def with_outlines_of_bodies(
         scene: The frame.
     """
     return tuple(
-        _with_outline_of_body(t, [o.visible for o in tracks if o is not t], bodies, views, scene)
+        _with_outline_of_body(
+            t, [o.visible for o in tracks if o is not t], bodies, views[t.view_number], scene
+        )
         for t in tracks
     )
 
@@ -131,34 +133,43 @@ def _with_outline_of_body(
     track: TaughtObjectTrack,
     others: Sequence[Blob | None],
     bodies: Sequence[MovingBody],
-    views: Sequence[ViewModel],
+    view: ViewModel,
     scene: Scene,
 ) -> TaughtObjectTrack:
-    visible, appearance, pose = track.visible, track.appearance, track.pose
-    if (
-        track.state is not TrackState.MOVING
-        or visible is None
-        or appearance is None
-        or pose is None
-    ):
+    if track.state is not TrackState.MOVING:
         return track
-    view = views[track.view_number]
-    unit = view.pose.scale * max(scene.size) / max(view.size)
-    most = BODY_AREA * max(view.appearance.area * unit**2, appearance.area * pose.scale**2)
-    for body in bodies:
-        blob = body.blob
-        if (
-            BODY_GROWTH * visible.area <= blob.area <= most
-            and overlap_of_smaller(visible, blob) >= BODY_INSIDE
-            and not any(o is not None and overlap_of_smaller(o, blob) > BODY_OTHERS for o in others)
-            and _has_colours_of(scene, view.appearance, blob, visible)
-        ):
-            left, top, right, bottom = blob.window
-            scale = float(np.sqrt(blob.area / view.appearance.area))
-            at = PatchPose((left + right - 1) / 2, (top + bottom - 1) / 2, scale, pose.angle)
-            seen = relearn_appearance(appearance, at, blob, scene)
-            return replace(track, pose=at, appearance=seen, visible=blob, path=((scene.time, at),))
+    for blob in (b.blob for b in bodies):
+        shared = any(o is not None and overlap_of_smaller(o, blob) > BODY_OTHERS for o in others)
+        if not shared and _is_part_of(track, blob, view, scene):
+            return _relearned_as(track, blob, view, scene)
     return track
+
+
+def _is_part_of(track: TaughtObjectTrack, blob: Blob, view: ViewModel, scene: Scene) -> bool:
+    """Whether what is followed is but a part of a body with the colours and about the size of the object."""
+    visible, appearance, pose = track.visible, track.appearance, track.pose
+    if visible is None or appearance is None or pose is None:
+        return False
+    unit = view.pose.scale * max(scene.size) / max(view.size)
+    area = max(view.appearance.area * unit**2, appearance.area * pose.scale**2)
+    return (
+        BODY_GROWTH * visible.area <= blob.area <= BODY_AREA * area
+        and overlap_of_smaller(visible, blob) >= BODY_INSIDE
+        and _has_colours_of(scene, view.appearance, blob, visible)
+    )
+
+
+def _relearned_as(
+    track: TaughtObjectTrack, blob: Blob, view: ViewModel, scene: Scene
+) -> TaughtObjectTrack:
+    """A track whose object is a blob: its outline, its pose, and what it looks like there."""
+    assert track.appearance is not None
+    assert track.pose is not None
+    left, top, right, bottom = blob.window
+    scale = float(np.sqrt(blob.area / view.appearance.area))
+    pose = PatchPose((left + right - 1) / 2, (top + bottom - 1) / 2, scale, track.pose.angle)
+    seen = relearn_appearance(track.appearance, pose, blob, scene)
+    return replace(track, pose=pose, appearance=seen, visible=blob, path=((scene.time, pose),))
 
 
 def _has_colours_of(scene: Scene, appearance: Appearance, blob: Blob, known: Blob) -> bool:

@@ -15,12 +15,13 @@ from visup.percepts.appearance.tracking.adaptation import with_outlines_of_bodie
 from visup.percepts.appearance.tracking.redetection import taught_pose
 from visup.percepts.appearance.tracking.track import TaughtObjectTrack, TrackState
 
-PLACES = {"tray": (100, 50), "tool": (40, 40)}
+PLACES = {"tray": (100, 50), "tool": (40, 40), "part": (40, 120), "twin": (70, 120)}
 IMAGE, MASKS = picture(PLACES)
 SCENE = prepare_scene(IMAGE, 1.0)
-VIEWS = view_models(shown(PLACES, "tool", "tray"))
+VIEWS = view_models(shown(PLACES, "tool", "tray", "part"))
 TOOL = MASKS["tool"]
-HALF = TOOL & (np.arange(TOOL.shape[1]) < 52)
+COLUMNS = np.arange(TOOL.shape[1])
+LEFT = TOOL & (COLUMNS < 58)
 
 Mask = NDArray[np.bool_]
 
@@ -41,10 +42,10 @@ def track(name: str, mask: Mask, state: TrackState = TrackState.MOVING) -> Taugh
 
 
 def corrected(
-    body: Mask, *others: TaughtObjectTrack, state: TrackState = TrackState.MOVING
+    body: Mask, *others: TaughtObjectTrack, followed: TaughtObjectTrack | None = None
 ) -> TaughtObjectTrack:
-    """The tool, of which the left half is followed, with a moving body in the picture."""
-    tracks = (track("tool", HALF, state), *others)
+    """The tool, of which the left part is followed, or another track, with a moving body in the picture."""
+    tracks = (followed or track("tool", LEFT), *others)
     bodies = [MovingBody(7, blob(body), cut=False)]
     return with_outlines_of_bodies(tracks, bodies, VIEWS, SCENE)[0]
 
@@ -60,7 +61,7 @@ def pixels(found: TaughtObjectTrack) -> Mask:
 def test_the_whole_body_is_the_object_and_is_followed_as_such() -> None:
     found = corrected(TOOL)
     assert np.array_equal(pixels(found), TOOL)
-    assert found.id == track("tool", HALF).id
+    assert found.id == track("tool", LEFT).id
     assert found.pose is not None
     centre = np.argwhere(TOOL).mean(axis=0)[::-1]
     assert (found.pose.x, found.pose.y) == pytest.approx(tuple(centre), abs=1.0)
@@ -80,21 +81,34 @@ def wider(mask: Mask, pixels: int) -> Mask:
 @pytest.mark.parametrize(
     "body",
     [
-        pytest.param(HALF, id="no larger than what is followed"),
-        pytest.param(TOOL & ~HALF, id="elsewhere"),
-        pytest.param(wider(TOOL, 10), id="largely of other colours"),
+        pytest.param(LEFT, id="no larger than what is followed"),
+        pytest.param(TOOL & (COLUMNS < 60), id="hardly larger"),
+        pytest.param(TOOL & ~LEFT, id="elsewhere"),
+        pytest.param(wider(TOOL, 11), id="largely of other colours"),
         pytest.param(wider(TOOL, 60), id="too large"),
     ],
 )
 def test_another_body_is_not_it(body: Mask) -> None:
-    assert np.array_equal(pixels(corrected(body)), HALF)
+    assert np.array_equal(pixels(corrected(body)), LEFT)
 
 
 def test_a_body_of_several_objects_is_none_of_them() -> None:
-    inner = TOOL & (np.arange(TOOL.shape[1]) > 58)
-    assert np.array_equal(pixels(corrected(TOOL, track("tray", inner))), HALF)
+    inner = TOOL & (COLUMNS > 58)
+    assert np.array_equal(pixels(corrected(TOOL, track("tray", inner))), LEFT)
     assert np.array_equal(pixels(corrected(TOOL, track("tray", MASKS["tray"]))), TOOL)
 
 
+def test_a_body_beside_what_is_followed_is_not_it() -> None:
+    rim = TOOL & (COLUMNS < 50)
+    found = corrected(TOOL & (COLUMNS >= 48), followed=track("tool", rim))
+    assert np.array_equal(pixels(found), rim)
+
+
+def test_two_equal_objects_that_move_together_are_not_one() -> None:
+    found = corrected(MASKS["part"] | MASKS["twin"], followed=track("part", MASKS["part"]))
+    assert np.array_equal(pixels(found), MASKS["part"])
+
+
 def test_what_rests_keeps_its_outline() -> None:
-    assert np.array_equal(pixels(corrected(TOOL, state=TrackState.RESTING)), HALF)
+    resting = track("tool", LEFT, TrackState.RESTING)
+    assert np.array_equal(pixels(corrected(TOOL, followed=resting)), LEFT)
