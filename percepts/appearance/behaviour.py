@@ -96,7 +96,7 @@ class AppearanceBehaviour:
             self._add_relit_views(tuple(relit_views(self._taught, frame.image)))
         last = self._tracker.scene
         scene = prepare_scene(frame.image, frame.time)
-        bodies = [moving_body(r, scene) for r in moving] if self._tracker.needs_bodies else []
+        bodies = [moving_body(r, scene) for r in moving] if self._tracker.seeks_new else []
         tracks = self._tracker.step(scene, lambda blob: self._id_for(blob, moving, scene), bodies)
         if not image_is_trusted(observation):
             return []

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,26 +9,17 @@ from numpy.typing import NDArray
 
 from visup.percepts.appearance.models.appearance_model import (
     Appearance,
-    ViewModel,
     learned_filter,
     surroundings,
 )
-from visup.percepts.appearance.models.blob import Blob, overlap_of_smaller, without
-from visup.percepts.appearance.models.colours import OWN_LOG_ODDS, colour_bins, learn_colours
-from visup.percepts.appearance.models.moving_body import MovingBody, colour_similarity
+from visup.percepts.appearance.models.blob import Blob
+from visup.percepts.appearance.models.colours import learn_colours
 from visup.percepts.appearance.models.pose import PatchPose, Window, cut_patch
 from visup.percepts.appearance.models.scene import Scene
 from visup.percepts.appearance.tracking.track import RestMemory, TaughtObjectTrack, TrackState
 
 Floats = NDArray[np.float32]
 
-BODY_GROWTH = 1.3
-"""Least area of a moving body, as a multiple of the pixels of the object in it, to correct its outline."""
-BODY_AREA = 1.5  # most area of such a body, as a multiple of the object's as taught or as tracked
-BODY_EXCESS, BODY_SIMILARITY = 0.45, 0.5  # least agreement of its colours (`colour_similarity`)
-BODY_OWN_SHARE = 0.45  # least share of its further pixels with colours of the object
-BODY_INSIDE = 0.7  # least share of the object's pixels within the body
-BODY_OTHERS = 0.1  # most of another object within it, as a share of the smaller one
 SURE_PEAK, SURE_SHARE = 0.4, 0.5  # no adaptation below these: it may be another object
 SURE_COLOURS = 0.35  # colour excess from which the appearance is adapted all the same
 # The rates below are shares of the new observation per update.
@@ -102,85 +92,6 @@ def relearn_appearance(
     lab = scene.patch(pose, appearance.shape)
     mask = _in_patch(blob.window, blob.mask, pose, appearance.shape, scene)
     return Appearance(lab, mask, appearance.colours, learned_filter(lab, mask, appearance.colours))
-
-
-def with_outlines_of_bodies(
-    tracks: Sequence[TaughtObjectTrack],
-    bodies: Sequence[MovingBody],
-    views: Sequence[ViewModel],
-    scene: Scene,
-) -> tuple[TaughtObjectTrack, ...]:
-    """The tracks, each that is but a part of a moving body of its colours and size with the body's outline.
-
-    A vehicle that turns shows a side that it has not shown before: what is known of its shape no longer
-    holds, but it moves as one body. An arm is larger than its gripper, or has other colours.
-
-    Args:
-        tracks: The tracks, with the pixels that they won in the frame.
-        bodies: The moving bodies of the frame.
-        views: The taught views.
-        scene: The frame.
-    """
-    return tuple(
-        _with_outline_of_body(
-            t, [o.visible for o in tracks if o is not t], bodies, views[t.view_number], scene
-        )
-        for t in tracks
-    )
-
-
-def _with_outline_of_body(
-    track: TaughtObjectTrack,
-    others: Sequence[Blob | None],
-    bodies: Sequence[MovingBody],
-    view: ViewModel,
-    scene: Scene,
-) -> TaughtObjectTrack:
-    if track.state is not TrackState.MOVING:
-        return track
-    for blob in (b.blob for b in bodies):
-        shared = any(o is not None and overlap_of_smaller(o, blob) > BODY_OTHERS for o in others)
-        if not shared and _is_part_of(track, blob, view, scene):
-            return _relearned_as(track, blob, view, scene)
-    return track
-
-
-def _is_part_of(track: TaughtObjectTrack, blob: Blob, view: ViewModel, scene: Scene) -> bool:
-    """Whether what is followed is but a part of a body with the colours and about the size of the object."""
-    visible, appearance, pose = track.visible, track.appearance, track.pose
-    if visible is None or appearance is None or pose is None:
-        return False
-    unit = view.pose.scale * max(scene.size) / max(view.size)
-    area = max(view.appearance.area * unit**2, appearance.area * pose.scale**2)
-    return (
-        BODY_GROWTH * visible.area <= blob.area <= BODY_AREA * area
-        and overlap_of_smaller(visible, blob) >= BODY_INSIDE
-        and _has_colours_of(scene, view.appearance, blob, visible)
-    )
-
-
-def _relearned_as(
-    track: TaughtObjectTrack, blob: Blob, view: ViewModel, scene: Scene
-) -> TaughtObjectTrack:
-    """A track whose object is a blob: its outline, its pose, and what it looks like there."""
-    assert track.appearance is not None
-    assert track.pose is not None
-    left, top, right, bottom = blob.window
-    scale = float(np.sqrt(blob.area / view.appearance.area))
-    pose = PatchPose((left + right - 1) / 2, (top + bottom - 1) / 2, scale, track.pose.angle)
-    seen = relearn_appearance(track.appearance, pose, blob, scene)
-    return replace(track, pose=pose, appearance=seen, visible=blob, path=((scene.time, pose),))
-
-
-def _has_colours_of(scene: Scene, appearance: Appearance, blob: Blob, known: Blob) -> bool:
-    """Whether a blob has the colours of an object, also apart from the pixels known to be the object's."""
-    excess, similarity = colour_similarity(scene, appearance, blob)
-    if excess < BODY_EXCESS or similarity < BODY_SIMILARITY:
-        return False
-    left, top, right, bottom = blob.window
-    own = appearance.colours.odds(colour_bins(scene.lab[0][top:bottom, left:right])) > OWN_LOG_ODDS
-    rest = without(blob, known).mask
-    return bool(np.mean(own[rest]) >= BODY_OWN_SHARE) if rest.any() else False
 
 
 def _in_patch(

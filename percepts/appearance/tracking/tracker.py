@@ -28,7 +28,6 @@ from visup.percepts.appearance.tracking.adaptation import (
     adapt_appearance,
     put_at_rest,
     relearn_appearance,
-    with_outlines_of_bodies,
 )
 from visup.percepts.appearance.tracking.drift_correction import correct_drift
 from visup.percepts.appearance.tracking.instances import further_instances
@@ -111,9 +110,9 @@ class TaughtObjectTracker:
         return found
 
     @property
-    def needs_bodies(self) -> bool:
-        """Whether moving bodies matter: some object has not been detected yet, or moves."""
-        return any(not t.id or t.state is TrackState.MOVING for t in self.tracks)
+    def seeks_new(self) -> bool:
+        """Whether some object has not been detected yet: only those are compared with moving bodies."""
+        return any(not t.id for t in self.tracks)
 
     def save(self) -> Mapping[str, Any]:
         """The state after the frames so far."""
@@ -131,7 +130,7 @@ class TaughtObjectTracker:
         Args:
             scene: The frame.
             new_id: Returns the id of an object detected for the first time.
-            bodies: Segmented moving bodies of the frame; not needed unless `needs_bodies`.
+            bodies: Segmented moving bodies of the frame; not needed unless `seeks_new`.
 
         Returns:
             The tracks; see there.
@@ -150,7 +149,6 @@ class TaughtObjectTracker:
         self._background.move(self._camera)
         self._redetect(scene, bodies)
         self._segment(scene, same)
-        self.tracks = with_outlines_of_bodies(self.tracks, bodies, self.views, scene)
         self._background.update(scene, visible_pixels(self.tracks, scene))
         tracks = (_with_id(t, scene, new_id) for t in self.tracks)
         self.tracks = tuple(t for t in tracks if t.id or t.instance == 1)
