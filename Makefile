@@ -4,12 +4,11 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 COMPILED := $(VENV)/.compiled
-WHEEL := build/wheel-folder
 
 # The tests start hundreds of processes: each would read all of visup's source anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: setup demo test check fuzz oracles bench docs wheel clean
+.PHONY: setup demo test check fuzz oracles bench docs wheel built-wheel clean
 
 setup: $(COMPILED)
 
@@ -62,10 +61,10 @@ docs: $(STAMP)
 	@echo 'Documentation: site/index.html'
 
 # Built from the sdist, it works in a clean environment, and for a user who may write nowhere.
-wheel: $(WHEEL) setup
+wheel: built-wheel setup
 	.ci/wheel try
 
-$(WHEEL):
+built-wheel:
 	.ci/wheel build
 
 clean:
