@@ -8,11 +8,9 @@ number of threads, and sums are taken in the order that is written: no reorderin
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import TypeVar, cast
 
 import numba
-from numba.core.caching import CompileResultCacheImpl, FunctionCache
 
 _uncached: list[str] = []
 
@@ -48,46 +46,14 @@ def compiled(function: Function) -> Function:
         return cast(Function, _compiled_by_another(function))
 
 
-def _compiled_by_another(function: Callable[..., object]) -> Any:
+def _compiled_by_another(function: Callable[..., object]) -> object:
     """What whoever installed visup has compiled, and what this user has to compile in each run."""
-    dispatcher: Any = numba.njit(nogil=True)(function)
+    dispatcher = numba.njit(nogil=True)(function)
     try:
-        dispatcher._cache = _InstalledCache(function)  # type: ignore[no-untyped-call]
-    except RuntimeError:  # they have never run it
+        # Here, since it relies on what numba does not promise, and few users need it.
+        from visup.installed_loops import read_installed
+
+        read_installed(dispatcher, function, lambda: _uncached.append(function.__name__))
+    except (ImportError, RuntimeError):  # another numba, or they have never run it
         _uncached.append(function.__name__)
     return dispatcher
-
-
-_beside_the_code = next(
-    c for c in CompileResultCacheImpl._locator_classes if "InTree" in c.__name__
-)
-
-
-class _ReadableFolder(_beside_the_code):  # type: ignore[misc, valid-type]
-    """Finds compiled loops beside the code, where nothing need be written."""
-
-    def ensure_cache_path(self) -> None:
-        if not Path(self.get_cache_path()).is_dir():
-            raise FileNotFoundError(self.get_cache_path())
-
-
-class _InstalledImpl(CompileResultCacheImpl):
-    _locator_classes = [_ReadableFolder]  # noqa: RUF012
-
-
-class _InstalledCache(FunctionCache):
-    """Compiled loops that are read and never written."""
-
-    _impl_class = _InstalledImpl
-
-    def load_overload(self, sig: Any, target_context: Any) -> object:
-        try:
-            found: object = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
-        except PermissionError:
-            found = None
-        if found is None:
-            _uncached.append(self._py_func.__name__)
-        return found
-
-    def save_overload(self, sig: Any, data: Any) -> None:
-        """Nothing: it could not be written."""
