@@ -92,6 +92,41 @@ def time_to_contact(gap: float, rate: float) -> float:
 
 
 @compiled
+def covered_pairs(
+    separation: Floats, slow: NDArray[np.bool_], near: float, change: float
+) -> NDArray[np.bool_]:
+    """Pairs of slow bodies of which one is, or just was, beside a third body that moves.
+
+    Args:
+        separation: (T, M, M) signed distances of the hulls over the window, pixels; NaN unknown.
+        slow: (M,) bodies that hardly move.
+        near: Distance at which the third body may cover or shade it, pixels.
+        change: Least change of that distance over the window by which a slow third body moves, pixels.
+
+    Returns:
+        (P,) bool.
+    """
+    samples, count = len(separation), separation.shape[1]
+    passed = np.zeros((count, count), np.bool_)
+    for i in range(count):
+        for k in range(count):
+            least, most = np.inf, -np.inf
+            for t in range(samples):
+                apart = separation[t, i, k]
+                if slow[i] and i != k and not np.isnan(apart):
+                    least, most = min(least, apart), max(most, apart)
+            passed[i, k] = least < near and (most - least > change or not slow[k])
+    found, number = np.zeros(count * (count - 1) // 2, np.bool_), -1
+    for i in range(count):
+        for j in range(i + 1, count):
+            number += 1
+            for k in range(count):
+                third = slow[i] and slow[j] and k not in (i, j)
+                found[number] |= third and (passed[i, k] or passed[j, k])
+    return found
+
+
+@compiled
 def pair_tables(
     gaps: Floats,
     slope: Floats,

@@ -12,7 +12,12 @@ from visup.rules.geometry._recent_motion_jit import fit_motion
 from visup.rules.geometry.outlines import NEAR_SHARE, outline_gap
 from visup.rules.geometry.pairs import pairs, reindexing
 from visup.rules.geometry.regions import DIRECTIONS, FAN, Floats, image_diagonal
-from visup.rules.relations._kinematics_jit import hull_gaps, pair_tables, time_to_contact
+from visup.rules.relations._kinematics_jit import (
+    covered_pairs,
+    hull_gaps,
+    pair_tables,
+    time_to_contact,
+)
 from visup.rules.relations.rows import PairQuantity
 from visup.rules.relations.samples import SampleWindow
 from visup.rules.relations.thresholds import ThresholdSettings
@@ -40,6 +45,12 @@ class RelationSettings:
         touch_enter: Outline gap at which bodies touch, image diagonals.
         touch_exit: Outline gap at which they no longer do.
         touch_minimum_s: Least duration of a touch.
+        covering_gap: Distance at which a third body may cover or shade one of a pair, image diagonals.
+        passing: Least change of that distance over the window for it to pass by, image diagonals.
+        slow_speed: Speed below which a change of a pair's distance may be due to that, image diagonals per
+            second.
+        covered_sigma: Standard deviation of the trend of such a pair, image diagonals per second: its
+            outlines shift.
         still_speed: Relative speed over the window below which two bodies are at rest relative to each
             other, image diagonals per second.
         still_half: The same in each half of the window, where the noise is greater.
@@ -68,6 +79,10 @@ class RelationSettings:
     touch_enter: float = 0.0035
     touch_exit: float = 0.006
     touch_minimum_s: float = 0.2
+    covering_gap: float = 0.05
+    passing: float = 0.0125
+    slow_speed: float = 0.0125
+    covered_sigma: float = 0.004
     still_speed: float = 0.0025
     still_half: float = 0.0045
     misfit: float = 0.0075
@@ -226,6 +241,9 @@ class KinematicsEstimator:
             (*windows, noise, strong, s.change_sigmas, s.misfit * diagonal),
             s.bins,
         )
+        slow = np.hypot(motion[0, :, 0], motion[0, :, 1]) < s.slow_speed * diagonal
+        covered = covered_pairs(h.separation, slow, s.covering_gap * diagonal, s.passing * diagonal)
+        sigma = np.where(covered, np.hypot(sigma, s.covered_sigma * diagonal), sigma)
         found, speed = pair_tables(
             gaps,
             slope,

@@ -33,6 +33,7 @@ from visup.tasks.supervision.advance import Advance
 from visup.tasks.supervision.hypotheses import ContactEntry, TaskHypotheses, TaskHypothesis
 from visup.tasks.supervision.open_transitions import OpenTransitions
 from visup.tasks.verification.observation import ActionObservation
+from visup.tasks.verification.observe import TRENDS
 from visup.tasks.verification.settings import TaskSettings
 from visup.tasks.verification.step_model import Observe, StepModel
 from visup.tasks.verification.step_monitor import BAD, Moment
@@ -112,6 +113,13 @@ class MonitoredPhases:
     def first_steps(self) -> tuple[TaskStep, ...]:
         """The steps with which the task may begin."""
         return tuple(self._open.first_steps())
+
+    @cached_property
+    def moved_later(self) -> frozenset[str]:
+        """The actors that later stages require to approach or leave something, and no first step names."""
+        first = {a for step in self.first_steps for a in step.actors}
+        steps = later_steps(self.automaton, [node for node, _, _ in self.begin(0.0)])
+        return frozenset(s.actors[0] for s in steps if s.action in TRENDS) - first
 
     @cached_property
     def _requirements(self) -> dict[int, tuple[Requirement, ...]]:

@@ -95,14 +95,20 @@ begins a task."""
 
 
 def begun_by_motion(
-    before: TaskMemory, resting: Resting, snapshot: TaskSnapshot, posterior: TaskHypotheses | None
+    model: MonitoredPhases,
+    before: TaskMemory,
+    resting: Resting,
+    snapshot: TaskSnapshot,
+    posterior: TaskHypotheses | None,
 ) -> frozenset[str]:
     """The stages that begin since their actors start to move.
 
-    Any motion begins the first stage of a task. A later one begins when an actor sets out after all of them
+    Any motion begins the first stage of a task, also that of an actor whose turn comes later: a cap
+    that is brought before its block. A later stage begins when an actor sets out after all of them
     have rested: a tug that leaves without its cart hauls it in vain.
 
     Args:
+        model: The task.
         before: The memory of the task before this step.
         resting: The stages that wait at rest, as of this step.
         snapshot: The observations.
@@ -110,7 +116,9 @@ def begun_by_motion(
     """
     if is_first(before.belief.stages):
         names = frozenset(s.stage for s in before.belief.stages)
-        return names if _shows_motion(snapshot, posterior) else frozenset()
+        too_soon = snapshot.objects(tuple(model.moved_later))
+        moves = not snapshot.setting_out.isdisjoint(too_soon)
+        return names if moves or _shows_motion(snapshot, posterior) else frozenset()
     rested = {stage for stage, since in resting if snapshot.mind.time - since >= REST_S - 1e-9}
     actors = {s: snapshot.objects(a) for s, a in _actors(posterior).items() if s in rested}
     return frozenset(s for s, ids in actors.items() if not snapshot.setting_out.isdisjoint(ids))

@@ -284,7 +284,7 @@ def _belief(
         belief = out_of_order_belief(belief, old, new.order_violation.why, now)
     if memory.forbidden:
         belief = replace(belief, stages=old.stages, current=old.current)
-    moved = begun_by_motion(memory, new.resting, snapshot, new.posterior)
+    moved = begun_by_motion(model, memory, new.resting, snapshot, new.posterior)
     least = model.settings.unexplained_s
     return replace(
         belief,

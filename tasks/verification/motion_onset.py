@@ -33,9 +33,6 @@ MOVING_SIGMAS = 3.0
 SETTING_OUT = 0.0125
 """Least speed of a body that sets out, image diagonals per second: one that only shifts is slower."""
 
-NEAR = 0.05
-"""Distance at which a body that moves may cover or shade another one, image diagonals."""
-
 Mask = NDArray[np.bool_]
 
 
@@ -51,18 +48,29 @@ def moving_bodies(mind: Mind, least: float = 0.0) -> frozenset[int]:
     now, window = kinematics(mind), sample_window(mind)
     if window.ids != now.ids or not len(window.times):
         return frozenset()
-    still = max(least, relation_settings(mind).still_speed)
-    limits = np.where(near_movers(now, diagonal), max(still, SETTING_OUT), still) * diagonal
+    settings = relation_settings(mind)
+    still, slow = max(least, settings.still_speed) * diagonal, settings.slow_speed * diagonal
+    beside = near_movers(now, slow, settings.covering_gap * diagonal)
+    limits = np.where(beside, max(still, slow), still)
     moving_slowly = moving(now, limits) & moving_more_than_others(window)
     is_moving = moving_slowly | advancing_outlines(window, MIN_ADVANCE * diagonal)
     return frozenset(i for i, moves in zip(now.ids, is_moving.tolist(), strict=True) if moves)
 
 
-def near_movers(now: Kinematics, diagonal: float) -> Mask:
-    """(M,) bool: bodies beside others that are not known to be slow, which may cover or shade them."""
+def near_movers(now: Kinematics, slow: float, gap: float) -> Mask:
+    """Bodies beside others that are not known to be slow, which may cover or shade them.
+
+    Args:
+        now: The present quantities.
+        slow: Speed below which a body is slow, pixels per second.
+        gap: Distance up to which one is beside another, pixels.
+
+    Returns:
+        (M,) bool.
+    """
     with np.errstate(invalid="ignore"):
-        fast = ~(now.speed < SETTING_OUT * diagonal)
-        near = now.gap < NEAR * diagonal
+        fast = ~(now.speed < slow)
+        near = now.gap < gap
     np.fill_diagonal(near, False)
     return np.asarray((near & fast).any(axis=1))
 
@@ -91,7 +99,8 @@ def moving_more_than_others(window: SampleWindow) -> Mask:
     most = np.where(free, reach, -np.inf).max(axis=0)
     spans = most - np.where(free, reach, np.inf).min(axis=0)
     span = np.where(free.any(axis=0), spans, 0.0).max(axis=1)
-    known = free.any(axis=(0, 2))
+    # The span of one that has just come in is small, whatever moves.
+    known = free[0].any(axis=1) & free[-1].any(axis=1)
     found = np.ones(len(span), dtype=bool)
     for i in range(len(span)):
         others = np.delete(span, i)[np.delete(known, i)]

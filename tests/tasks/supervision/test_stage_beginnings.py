@@ -212,3 +212,31 @@ def test_what_shifts_beside_a_mover_begins_no_stage(tmp_path: Path, gripper: boo
     roles = {"block": BLOCK, "base": BASE, "gripper": GRIPPER}
     events = watched(tmp_path, STACK, partial(shifting, gripper=gripper), roles, SHIFTS_S + 0.9)
     assert (first(events, "stage_started", "t") is None) is gripper
+
+
+ASSEMBLE = """
+<t>           ::= <bring_block> <bring_cap>
+<bring_block> ::= converging(block, base)
+<bring_cap>   ::= converging(cap, base)
+"""
+CAP, CAP_LEAVES_S = 4, 1.5
+
+
+def bringing(now: float, mover: int, speed: float) -> Mask:
+    """Three bodies at rest, of which one sets out."""
+    boxes = {BLOCK: (60, 30, 40, 40), BASE: (240, 180, 60, 40), CAP: (60, 180, 40, 30)}
+    x, *rest = boxes[mover]
+    boxes[mover] = (x + speed * max(0.0, now - CAP_LEAVES_S), *rest)
+    return drawn(boxes)
+
+
+@pytest.mark.parametrize(("mover", "speed", "begins"), [(CAP, 60, 1), (BLOCK, 60, 1), (CAP, 4, 0)])
+def test_a_task_begins_with_the_part_whose_turn_comes_later(
+    tmp_path: Path, mover: int, speed: float, begins: int
+) -> None:
+    roles = {"block": BLOCK, "base": BASE, "cap": CAP}
+    mask = partial(bringing, mover=mover, speed=speed)
+    events = watched(tmp_path, ASSEMBLE, mask, roles, CAP_LEAVES_S + 0.8)
+    at = first(events, "stage_started", "bring_block")
+    assert at == (pytest.approx(CAP_LEAVES_S + 0.3, abs=0.3) if begins else None)
+    assert first(events, "stage_started", "bring_cap") is None

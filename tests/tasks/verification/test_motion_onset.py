@@ -13,8 +13,6 @@ from visup.rules.relations.rows import PairQuantity
 from visup.rules.relations.samples import SampleWindow
 from visup.tasks.verification.motion_onset import (
     LAG_S,
-    NEAR,
-    SETTING_OUT,
     advancing_outlines,
     moving_more_than_others,
     near_movers,
@@ -90,6 +88,17 @@ def test_the_order_of_bodies_does_not_matter(order: list[int], shift: tuple[floa
         assert np.array_equal(question(turned), question(seen)[order])
 
 
+@given(st.integers(2, 4), st.integers(0, len(TIMES) - 1), shifts)
+def test_a_body_that_has_just_come_in_does_not_make_the_others_move(
+    bodies: int, since: int, shift: tuple[float, float]
+) -> None:
+    """Beside a swaying camera: the newcomer has hardly changed its place yet."""
+    reach, free = resting(bodies + 1) + path(shift)[:, None], np.ones((len(TIMES), bodies + 1, FAN))
+    free[:since, bodies] = 0.0
+    found = moving_more_than_others(window(reach, free))
+    assert np.hypot(*shift) <= 1.0 or not found[:bodies].any()
+
+
 def test_an_advancing_part_of_a_body_suffices() -> None:
     reach = resting(3)
     reach[6:, 0, 3] += 10.0
@@ -115,13 +124,13 @@ def test_a_short_history_shows_no_motion() -> None:
     assert not advancing_outlines(window(reach), LIMIT).any()
 
 
-DIAGONAL = 600.0
+SLOW, GAP = 7.5, 30.0
 unknown = st.just(float("nan"))
 
 
 @given(
-    st.lists(st.floats(0, 4 * SETTING_OUT * DIAGONAL) | unknown, min_size=1, max_size=4),
-    st.lists(st.floats(0, 3 * NEAR * DIAGONAL) | unknown, min_size=6, max_size=6),
+    st.lists(st.floats(0, 4 * SLOW) | unknown, min_size=1, max_size=4),
+    st.lists(st.floats(0, 3 * GAP) | unknown, min_size=6, max_size=6),
 )
 def test_beside_a_mover_is_what_is_near_another_body_not_known_to_be_slow(
     speeds: list[float], gaps: list[float]
@@ -136,7 +145,7 @@ def test_beside_a_mover_is_what_is_near_another_body_not_known_to_be_slow(
             gap = next(free)
             tables[PairQuantity.GAP, [i, j], [j, i]] = gap
             for a, b in ((i, j), (j, i)):
-                slow = speeds[b] < SETTING_OUT * DIAGONAL
-                expected[a] |= gap < NEAR * DIAGONAL and not slow
+                slow = speeds[b] < SLOW
+                expected[a] |= gap < GAP and not slow
     now = Kinematics(tuple(range(count)), tables, speed=np.array(speeds))
-    assert near_movers(now, DIAGONAL).tolist() == expected
+    assert near_movers(now, SLOW, GAP).tolist() == expected
