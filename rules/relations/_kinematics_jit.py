@@ -55,16 +55,54 @@ def hull_gaps(
 
 
 @compiled
-def _separation_speed(support: Floats, seen: Floats, i: int, j: int, directions: Floats) -> float:
-    """Speed at which body j moves away from body i, by their image motion, pixels per second.
-
-    It is measured along the direction from i to j in which the hulls overlap least.
-    """
-    half, least, at = len(directions) // 2, np.inf, 0
-    for k in range(len(directions)):
+def _least_overlap(support: Floats, i: int, j: int) -> int:
+    """Number of the direction from body i to body j in which their hulls overlap least; -1 unknown."""
+    half, least, at = support.shape[1] // 2, np.inf, -1
+    for k in range(2 * half):
         reach = support[i, k] + support[j, (k + half) % (2 * half)]
         if reach < least:
             least, at = reach, k
+    return at
+
+
+@compiled
+def steady_separation(
+    separation: Floats, support: Floats, drift: Floats, directions: Floats
+) -> Floats:
+    """Distances of the hulls as they would have been if the camera had always been as it is now.
+
+    A camera that zooms out brings all bodies nearer to each other. What it moved is taken out along the
+    direction in which the hulls overlap least now; distances of bodies out of view stay as they are.
+
+    Args:
+        separation: (T, M, M) signed distances of the hulls, pixels; NaN unknown.
+        support: (M, K) support of the outlines at the last sample, pixels.
+        drift: (T, M, 2) accumulated image motion of the static scene at each body, pixels.
+        directions: (K, 2) unit vectors.
+
+    Returns:
+        (T, M, M) pixels.
+    """
+    samples, count = len(separation), separation.shape[1]
+    found = separation.copy()
+    for i in range(count):
+        for j in range(i + 1, count):
+            at = _least_overlap(support, i, j)
+            if at < 0:
+                continue
+            x, y = directions[at]
+            for t in range(samples):
+                dx = drift[-1, j, 0] - drift[t, j, 0] - drift[-1, i, 0] + drift[t, i, 0]
+                dy = drift[-1, j, 1] - drift[t, j, 1] - drift[-1, i, 1] + drift[t, i, 1]
+                found[t, i, j] += x * dx + y * dy
+                found[t, j, i] += x * dx + y * dy
+    return found
+
+
+@compiled
+def _separation_speed(support: Floats, seen: Floats, i: int, j: int, directions: Floats) -> float:
+    """Speed at which body j moves away from body i, by their image motion, pixels per second."""
+    at = max(0, _least_overlap(support, i, j))
     x, y = seen[j, 1] - seen[i, 1], seen[j, 2] - seen[i, 2]
     return float(x * directions[at, 0] + y * directions[at, 1])
 

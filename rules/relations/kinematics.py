@@ -232,17 +232,17 @@ class KinematicsEstimator:
         s, diagonal = self.settings, image_diagonal(mind.frame_size)
         noise, strong = s.thresholds.noise_px, 2.0 * s.rate_enter * diagonal
         gaps = self._gaps(objects, seen, h, mind, before)
-        windows = s.window_s, s.motion_window_s
+        windows, apart = (s.window_s, s.motion_window_s), h.steady_separation
         slope, sigma, motion, spread = fit_motion(
             h.times,
             (h.steady_support, h.free, h.image),
-            h.separation,
+            apart,
             DIRECTIONS,
             (*windows, noise, strong, s.change_sigmas, s.misfit * diagonal),
             s.bins,
         )
         slow = np.hypot(motion[0, :, 0], motion[0, :, 1]) < s.slow_speed * diagonal
-        covered = covered_pairs(h.separation, slow, s.covering_gap * diagonal, s.passing * diagonal)
+        covered = covered_pairs(apart, slow, s.covering_gap * diagonal, s.passing * diagonal)
         sigma = np.where(covered, np.hypot(sigma, s.covered_sigma * diagonal), sigma)
         found, speed = pair_tables(
             gaps,

@@ -14,6 +14,7 @@ from visup.agent.model.fast_replace import replace
 from visup.rules.geometry.outlines import write_support
 from visup.rules.geometry.regions import DIRECTIONS, FAN, Floats, hull_separation
 from visup.rules.presence.object_tracks import merged_pairs, presence_memory
+from visup.rules.relations._kinematics_jit import steady_separation
 
 ROOM = 64
 """Number of further samples for which memory is allocated."""
@@ -73,6 +74,14 @@ class SampleWindow:
             return self.support
         steady: Floats = self.support - self.drift @ DIRECTIONS.T
         return steady
+
+    @property
+    def steady_separation(self) -> Floats:
+        """(T, M, M) pixels: distances of the hulls as if the camera had always been as it is now."""
+        if not self.drift.any():
+            return self.separation
+        found: Floats = steady_separation(self.separation, self.support[-1], self.drift, DIRECTIONS)
+        return found
 
 
 def sampled(

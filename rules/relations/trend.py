@@ -32,6 +32,6 @@ def trend_onset(window: SampleWindow, a: int, b: int, trend: str) -> float | Non
     """
     if not {a, b} <= set(window.ids):
         return None
-    distance = window.separation[:, window.ids.index(a), window.ids.index(b)]
+    distance = window.steady_separation[:, window.ids.index(a), window.ids.index(b)]
     known = ~np.isnan(distance)
     return bend(window.times[known], SIGNS[trend] * distance[known])

@@ -82,7 +82,7 @@ def new_trend(mind: Mind, trend: str, ids: tuple[int, ...]) -> Relation | None:
     window, now = sample_window(mind), kinematics(mind)
     if len(ids) != 2 or not set(ids) <= set(window.ids) or not len(window.times):
         return None
-    distance = window.separation[:, window.ids.index(ids[0]), window.ids.index(ids[1])]
+    distance = window.steady_separation[:, window.ids.index(ids[0]), window.ids.index(ids[1])]
     known = ~np.isnan(distance)
     if not known[-1]:
         return None
