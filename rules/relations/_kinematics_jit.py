@@ -71,8 +71,9 @@ def steady_separation(
 ) -> Floats:
     """Distances of the hulls as they would have been if the camera had always been as it is now.
 
-    A camera that zooms out brings all bodies nearer to each other. What it moved is taken out along the
-    direction in which the hulls overlap least now; distances of bodies out of view stay as they are.
+    A camera that zooms out brings all bodies nearer to each other. It moves their centres; a gap between them
+    changes in proportion. This is taken out along the direction in which the hulls overlap least now. What
+    overlaps, or is out of view, stays as it is.
 
     Args:
         separation: (T, M, M) signed distances of the hulls, pixels; NaN unknown.
@@ -90,7 +91,11 @@ def steady_separation(
             at = _least_overlap(support, i, j)
             if at < 0:
                 continue
-            x, y = directions[at]
+            opposite = (at + len(directions) // 2) % len(directions)
+            gap = -support[i, at] - support[j, opposite]
+            extents = support[i, at] + support[i, opposite] + support[j, at] + support[j, opposite]
+            share = max(0.0, gap) / max(1e-9, max(0.0, gap) + 0.5 * extents)
+            x, y = share * directions[at]
             for t in range(samples):
                 dx = drift[-1, j, 0] - drift[t, j, 0] - drift[-1, i, 0] + drift[t, i, 0]
                 dy = drift[-1, j, 1] - drift[t, j, 1] - drift[-1, i, 1] + drift[t, i, 1]
