@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.tasks.scripted import ARM, IDENTITIES, INTRUDER, SATELLITE, RelationSpan, Script, watch
-from tests.tasks.supervision.drawn import Mask, drawn, first, watched
+from tests.tasks.supervision.drawn import Box, Mask, drawn, first, watched
 from visup.tasks.supervision import stage_beginnings
 
 APPROACH = "<t> ::= converging(arm, satellite)"
@@ -224,9 +224,13 @@ CAP, CAP_LEAVES_S = 4, 1.5
 
 def bringing(now: float, mover: int, speed: float) -> Mask:
     """Three bodies at rest, of which one sets out."""
-    boxes = {BLOCK: (60, 30, 40, 40), BASE: (240, 180, 60, 40), CAP: (60, 180, 40, 30)}
-    x, *rest = boxes[mover]
-    boxes[mover] = (x + speed * max(0.0, now - CAP_LEAVES_S), *rest)
+    boxes: dict[int, Box] = {
+        BLOCK: (60, 30, 40, 40),
+        BASE: (240, 180, 60, 40),
+        CAP: (60, 180, 40, 30),
+    }
+    x, y, width, height = boxes[mover]
+    boxes[mover] = (x + speed * max(0.0, now - CAP_LEAVES_S), y, width, height)
     return drawn(boxes)
 
 
