@@ -136,29 +136,33 @@ def time_to_contact(gap: float, rate: float) -> float:
 
 @compiled
 def covered_pairs(
-    separation: Floats, slow: NDArray[np.bool_], near: float, change: float
+    separation: Floats, velocity: Floats, limits: tuple[float, float, float]
 ) -> NDArray[np.bool_]:
-    """Pairs of slow bodies of which one is, or just was, beside a third body that moves.
+    """Pairs of slow bodies of which one is, or just was, beside a third body that moves relative to it.
 
     Args:
         separation: (T, M, M) signed distances of the hulls over the window, pixels; NaN unknown.
-        slow: (M,) bodies that hardly move.
-        near: Distance at which the third body may cover or shade it, pixels.
-        change: Least change of that distance over the window by which a slow third body moves, pixels.
+        velocity: (M, 2) pixels per second; NaN unknown.
+        limits: Speed below which a body is slow, pixels per second; distance at which the third body may
+            cover or shade it; least change of that distance over the window, if their relative velocity is
+            slow, pixels.
 
     Returns:
         (P,) bool.
     """
+    fast, near, change = limits
     samples, count = len(separation), separation.shape[1]
-    passed = np.zeros((count, count), np.bool_)
+    slow, passed = np.zeros(count, np.bool_), np.zeros((count, count), np.bool_)
     for i in range(count):
+        slow[i] = np.hypot(velocity[i, 0], velocity[i, 1]) < fast
         for k in range(count):
             least, most = np.inf, -np.inf
             for t in range(samples):
                 apart = separation[t, i, k]
-                if slow[i] and i != k and not np.isnan(apart):
+                if i != k and not np.isnan(apart):
                     least, most = min(least, apart), max(most, apart)
-            passed[i, k] = least < near and (most - least > change or not slow[k])
+            relative = np.hypot(velocity[i, 0] - velocity[k, 0], velocity[i, 1] - velocity[k, 1])
+            passed[i, k] = least < near and (most - least > change or not relative < fast)
     found, number = np.zeros(count * (count - 1) // 2, np.bool_), -1
     for i in range(count):
         for j in range(i + 1, count):

@@ -241,8 +241,8 @@ class KinematicsEstimator:
             (*windows, noise, strong, s.change_sigmas, s.misfit * diagonal),
             s.bins,
         )
-        slow = np.hypot(motion[0, :, 0], motion[0, :, 1]) < s.slow_speed * diagonal
-        covered = covered_pairs(apart, slow, s.covering_gap * diagonal, s.passing * diagonal)
+        passing = s.slow_speed * diagonal, s.covering_gap * diagonal, s.passing * diagonal
+        covered = covered_pairs(apart, motion[0], passing)
         sigma = np.where(covered, np.hypot(sigma, s.covered_sigma * diagonal), sigma)
         found, speed = pair_tables(
             gaps,

@@ -13,29 +13,35 @@ from tests.rules.scenes import box_region, seen
 from visup.agent import Truth
 from visup.rules.relations._kinematics_jit import covered_pairs
 
-FPS, NEAR, CHANGE = 25.0, 30.0, 8.0
+FPS, FAST, NEAR, CHANGE = 25.0, 10.0, 30.0, 8.0
+velocities = st.floats(-15, 15) | st.just(float("nan"))
 distances = st.floats(-50, 100) | st.just(float("nan"))
 
 
 @st.composite
 def histories(draw: st.DrawFn) -> tuple[np.ndarray, np.ndarray]:
-    """(T, M, M) distances of the hulls, and (M,) which bodies are slow."""
+    """(T, M, M) distances of the hulls, and (M, 2) velocities."""
     times, count = draw(st.integers(0, 4)), draw(st.integers(0, 4))
     half = np.triu(draw(arrays(float, (times, count, count), elements=distances)), 1)
-    return half + np.swapaxes(half, 1, 2), draw(arrays(bool, count))
+    return half + np.swapaxes(half, 1, 2), draw(arrays(float, (count, 2), elements=velocities))
 
 
-def by_sentences(apart: np.ndarray, slow: np.ndarray) -> list[bool]:
+def by_sentences(apart: np.ndarray, velocity: np.ndarray) -> list[bool]:
     """The same pair by pair, word by word."""
+
+    def slow(of: np.ndarray) -> bool:
+        return bool(np.hypot(*of) < FAST)
 
     def passes(i: int, third: int) -> bool:
         known = [x for x in apart[:, i, third].tolist() if x == x]
         near = bool(known) and min(known) < NEAR
-        return near and (not slow[third] or max(known) - min(known) > CHANGE)
+        moves = not slow(velocity[i] - velocity[third])
+        return near and (moves or max(known) - min(known) > CHANGE)
 
-    count = len(slow)
+    count = len(velocity)
     return [
-        bool(slow[i] and slow[j])
+        slow(velocity[i])
+        and slow(velocity[j])
         and any(passes(i, k) or passes(j, k) for k in range(count) if k not in (i, j))
         for i in range(count)
         for j in range(i + 1, count)
@@ -44,8 +50,9 @@ def by_sentences(apart: np.ndarray, slow: np.ndarray) -> list[bool]:
 
 @given(histories())
 def test_pairs_beside_a_third_body_that_moves(history: tuple[np.ndarray, np.ndarray]) -> None:
-    apart, slow = history
-    assert covered_pairs(apart, slow, NEAR, CHANGE).tolist() == by_sentences(apart, slow)
+    apart, velocity = history
+    found = covered_pairs(apart, velocity, (FAST, NEAR, CHANGE))
+    assert found.tolist() == by_sentences(apart, velocity)
 
 
 def converging(speed: float, passing: float | None, seconds: float = 2.4) -> Truth:
