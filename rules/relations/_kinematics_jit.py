@@ -71,9 +71,9 @@ def steady_separation(
 ) -> Floats:
     """Distances of the hulls as they would have been if the camera had always been as it is now.
 
-    A camera that zooms out brings all bodies nearer to each other. It moves their centres; a gap between them
-    changes in proportion. This is taken out along the direction in which the hulls overlap least now. What
-    overlaps, or is out of view, stays as it is.
+    A camera that zooms out brings all bodies nearer to each other. The drift is that of their centres; a gap
+    between them changes in proportion. The change is taken out along the direction in which the hulls overlap
+    least now. What overlaps, or is out of view, stays as it is.
 
     Args:
         separation: (T, M, M) signed distances of the hulls, pixels; NaN unknown.
@@ -155,7 +155,7 @@ def covered_pairs(
     slow, passed = np.zeros(count, np.bool_), np.zeros((count, count), np.bool_)
     for i in range(count):
         slow[i] = np.hypot(velocity[i, 0], velocity[i, 1]) < fast
-        for k in range(count):
+        for k in range(count if slow[i] else 0):
             least, most = np.inf, -np.inf
             for t in range(samples):
                 apart = separation[t, i, k]
