@@ -15,8 +15,9 @@ from visup.percepts.appearance.models.appearance_model import (
 from visup.percepts.appearance.models.blob import Blob
 from visup.percepts.appearance.models.colours import learn_colours
 from visup.percepts.appearance.models.pose import PatchPose, Window, cut_patch
+from visup.percepts.appearance.models.rest_memory import remember_at_rest
 from visup.percepts.appearance.models.scene import Scene
-from visup.percepts.appearance.tracking.track import RestMemory, TaughtObjectTrack, TrackState
+from visup.percepts.appearance.tracking.track import TaughtObjectTrack, TrackState
 
 Floats = NDArray[np.float32]
 
@@ -117,10 +118,15 @@ def put_at_rest(track: TaughtObjectTrack, scene: Scene, first: bool) -> TaughtOb
         return track
     if not first and scene.time - track.path[0][0] < REST_SHARE * PATH_S:
         return track
-    radius = appearance.radius
-    largest_motion = max(p.apart(pose, radius) for _, p in track.path)
-    if largest_motion > STILL_PX + STILL_SHARE * radius * pose.scale:
+    largest_motion = max(p.apart(pose, appearance.radius) for _, p in track.path)
+    if largest_motion > still_px(track):
         return track
-    left, top, right, bottom = track.visible.window
-    memory = RestMemory(track.visible, scene.lab[0][top:bottom, left:right].copy())
+    memory = remember_at_rest(scene, track.visible)
     return replace(track, state=TrackState.RESTING, rest=memory)
+
+
+def still_px(track: TaughtObjectTrack) -> float:
+    """Most apparent motion of a track at rest, working pixels."""
+    if track.appearance is None or track.pose is None:
+        return STILL_PX
+    return STILL_PX + STILL_SHARE * track.appearance.radius * track.pose.scale

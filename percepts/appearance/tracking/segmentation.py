@@ -12,9 +12,9 @@ from visup.percepts.appearance.models.appearance_model import Appearance
 from visup.percepts.appearance.models.blob import Blob
 from visup.percepts.appearance.models.colours import colour_bins
 from visup.percepts.appearance.models.pose import PatchPose, Window, paint, window_of
+from visup.percepts.appearance.models.rest_memory import RestMemory
 from visup.percepts.appearance.models.scene import Scene
 from visup.percepts.appearance.tracking._rest_check_jit import unchanged_pixels
-from visup.percepts.appearance.tracking.track import RestMemory
 from visup.percepts.appearance.tracking.verification import explained_pixels, template_of
 
 Floats = NDArray[np.float32]

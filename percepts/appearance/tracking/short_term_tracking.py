@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from visup.percepts.appearance.background.point_tracking import STILL, PointMotion, similarity_of
 from visup.percepts.appearance.models.appearance_model import Appearance
 from visup.percepts.appearance.models.pose import Doubles, PatchPose
+from visup.percepts.appearance.models.rest_memory import Displacement, displacement_since
 from visup.percepts.appearance.models.scene import Scene
-from visup.percepts.appearance.tracking.adaptation import PATH_S
+from visup.percepts.appearance.tracking.adaptation import PATH_S, still_px
 from visup.percepts.appearance.tracking.track import TaughtObjectTrack, TrackState
 from visup.percepts.appearance.tracking.verification import (
     colour_agreement,
@@ -29,6 +30,7 @@ LOSE_S = 0.5  # how long an object is tracked without being observed
 MIN_PEAK, MIN_SHARE = 0.25, 0.3  # least filter peak and explained share of a tracked object
 UNSURE_PEAK = 0.4  # filter peak below which colours localise the object
 OWN_COLOURS = 0.25  # least excess of the object's colours over the surroundings
+SHIFTED_PX = 0.5  # least shift at which an object at rest is looked at closely, working pixels
 MOVED_PX = 1.0  # least motion that ends rest, working pixels
 FIRM_MOVE_SHARE = 0.6
 """Share of an object's pixels that a move must explain if many points agree on it."""
@@ -54,6 +56,7 @@ class FrameMotion:
         points: Points on objects, by the number of their track.
         number: Number of the frame.
         same: For each object with a rest memory, by name, (h, w) bool: unchanged pixels of its window.
+        shifts: For each object at rest, by name, how far it has shifted.
     """
 
     scene: Scene
@@ -61,6 +64,7 @@ class FrameMotion:
     points: PointMotion
     number: int
     same: Mapping[str, NDArray[np.bool_]]
+    shifts: Mapping[str, Displacement]
 
     @property
     def static(self) -> bool:
@@ -85,6 +89,18 @@ def track_object(track: TaughtObjectTrack, owner: int, motion: FrameMotion) -> T
     return _track_moving(track, motion.points.of(owner), motion)
 
 
+def displacements(tracks: Iterable[TaughtObjectTrack], scene: Scene) -> dict[str, Displacement]:
+    """How far each object at rest has shifted in a frame since it came to rest, by name."""
+    resting = (t for t in tracks if t.state is TrackState.RESTING)
+    return {t.key: displacement_since(t.rest, scene) for t in resting if t.rest is not None}
+
+
+def is_calm(same: NDArray[np.bool_], shift: Displacement | None) -> bool:
+    """Whether an object at rest has neither changed nor shifted."""
+    shifted = shift is not None and shift.certain and shift.length >= SHIFTED_PX
+    return not shifted and bool(np.mean(same) > UNCHANGED_SHARE)
+
+
 def with_observation(track: TaughtObjectTrack, time: float, pose: PatchPose) -> TaughtObjectTrack:
     """The track with an observation at a pose and time (seconds) added to its path."""
     path = tuple(p for p in track.path if time - p[0] <= PATH_S)
@@ -101,10 +117,15 @@ def _track_at_rest(
     assert rest is not None
     same = motion.same[track.key]
     unchanged_share = float(np.mean(same[rest.blob.mask]))
-    if np.mean(same) > UNCHANGED_SHARE:
+    shift = motion.shifts.get(track.key)
+    if is_calm(same, shift):
         return with_observation(
             replace(track, explained_share=unchanged_share, peak=1.0), scene.time, pose
         )
+    if shift is not None and shift.certain and shift.length >= max(MOVED_PX, still_px(track)):
+        at = replace(pose, x=pose.x + shift.dx, y=pose.y + shift.dy)
+        _, peak = _filter_peak_of(scene, at, appearance)
+        return _observed_moving(track, at, peak, unchanged_share, scene)
     best, peak, firm = _localise(track, pose, points, motion)
     template = template_of(appearance.lab, appearance.mask)
     _, there = explained_pixels(template, scene.patch(best, appearance.shape))

@@ -6,13 +6,11 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from visup.percepts.appearance.models.appearance_model import Appearance
 from visup.percepts.appearance.models.blob import Blob
 from visup.percepts.appearance.models.pose import PatchPose
-
-Bytes = NDArray[np.uint8]
+from visup.percepts.appearance.models.rest_memory import RestMemory
 
 
 class TrackState(StrEnum):
@@ -25,19 +23,6 @@ class TrackState(StrEnum):
 
 
 IN_VIEW = (TrackState.MOVING, TrackState.RESTING)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RestMemory:
-    """The pixels of an object at rest, to be compared with later frames.
-
-    Attributes:
-        blob: The object, as completely as observed.
-        lab: (h, w, 3) uint8, Lab, of the blob's window.
-    """
-
-    blob: Blob
-    lab: Bytes
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -50,8 +50,9 @@ from visup.percepts.appearance.tracking.segmentation import (
     without_specks,
 )
 from visup.percepts.appearance.tracking.short_term_tracking import (
-    UNCHANGED_SHARE,
     FrameMotion,
+    displacements,
+    is_calm,
     track_object,
     with_observation,
 )
@@ -158,7 +159,8 @@ class TaughtObjectTracker:
         return [k for k, v in enumerate(self.views) if v.name == name]
 
     def _track_objects(self, old: Scene, scene: Scene, same: Mapping[str, Mask]) -> None:
-        calm = {n for n, mask in same.items() if np.mean(mask) > UNCHANGED_SHARE}
+        shifts = displacements(self.tracks, scene)
+        calm = {n for n, mask in same.items() if is_calm(mask, shifts.get(n))}
         resting = [t for t in self.tracks if t.state is TrackState.RESTING and t.key in calm]
         seen = [t for t in self.tracks if t.state in IN_VIEW]
         if self._static and seen and len(resting) == len(seen):
@@ -171,7 +173,9 @@ class TaughtObjectTracker:
             moved = self._track_points(old, scene, calm if self._static else set())
         self._static = camera is STILL
         self._camera = camera
-        motion = FrameMotion(scene, STILL if camera is None else camera, moved, self._count, same)
+        motion = FrameMotion(
+            scene, STILL if camera is None else camera, moved, self._count, same, shifts
+        )
         tracks = [track_object(t, k, motion) for k, t in enumerate(self.tracks)]
         for k, t in enumerate(tracks):
             if t.state in IN_VIEW and t.last_seen == scene.time:
