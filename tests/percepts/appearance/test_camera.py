@@ -79,6 +79,35 @@ def test_an_arm_that_reaches_in_does_not_move_the_scene() -> None:
     assert np.hypot(*total(track_object([(0.0, 0.0)] * len(reach), reach))) < 1.5
 
 
+def at_sea(at: tuple[float, float], number: int) -> Image:
+    """What a camera sees of a coast above water, whose waves run in three ways at once."""
+    image, water = picture(at, number=number), np.zeros((HEIGHT, WIDTH), dtype=np.float32)
+    for k, angle in enumerate((0.0, 2.4, 4.8)):
+        dx, dy = 2.0 * number * np.cos(angle) + at[0], number * np.sin(angle) + at[1]
+        shift = np.array([[1.0, 0.0, -60.0 - dx], [0.0, 1.0, -60.0 - dy]])
+        waves = texture(10 + k, 2 * WIDTH, 2 * HEIGHT) - 125
+        water += cv2.warpAffine(waves, shift, (WIDTH, HEIGHT), flags=cv2.INTER_LINEAR)
+    image[COAST:] = np.clip(125 + water / np.sqrt(3), 0, 255)[COAST:, :, None]
+    return image
+
+
+COAST = 35
+"""Rows that the coast fills, a fifth of the picture."""
+
+
+@pytest.mark.parametrize("speed", [0.0, 1.0])
+def test_waves_do_not_move_the_camera(speed: float) -> None:
+    """In a moment many of them seem to move as one; what is unknown for a while is made up for."""
+    count, track, moved = 30, CameraTrack(), []
+    scenes = [prepare_scene(at_sea((speed * k, 0.0), k), k / FPS) for k in range(count + 1)]
+    for old, new in pairwise(scenes):
+        track, camera = track_camera(track, old, new, None)
+        moved.append(camera)
+    x, y = total(moved)
+    assert np.hypot(x + speed * count, y) < 1.0
+    assert all(m is not None for m in moved[count // 2 :])
+
+
 @given(
     st.lists(st.floats(-0.3, 0.3), min_size=4, max_size=4),
     st.tuples(st.floats(-50, 50), st.floats(-50, 50)),
