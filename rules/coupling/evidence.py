@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -21,7 +22,7 @@ from visup.agent import (
 from visup.agent.model.memory import MemoryKey
 from visup.agent.model.relation_columns import UNKNOWN_CODE, ColumnLayout, RelationBlock
 from visup.rules.coupling.contact import ContactSettings, Feet, OutlineContact
-from visup.rules.coupling.relative_motion import RelativeTrack
+from visup.rules.coupling.relative_motion import RelativeTrack, RelativeVelocity
 from visup.rules.geometry.regions import image_diagonal
 from visup.rules.presence.object_tracks import merged_pairs
 from visup.rules.relations.reasoner import kinematics
@@ -114,6 +115,23 @@ def common_speed(mind: Mind, pair: Pair) -> float:
     return min((s for s in speeds if s is not None), default=0.0)
 
 
+def common_speed_nearby(
+    mind: Mind, pair: Pair, track: RelativeTrack | None, relative: RelativeVelocity | None
+) -> float:
+    """The same where a body counts only near the other one: an arm as a whole is slower than its hand.
+
+    The velocity of the part near the other body is that of the other body, changed by their relative one.
+    """
+    if track is None or relative is None or track.first.local == track.second.local:
+        return common_speed(mind, pair)
+    one = own_velocity(mind, pair[1] if track.first.local else pair[0])
+    if one is None:
+        return common_speed(mind, pair)
+    towards = -1.0 if track.first.local else 1.0
+    part = np.add(one, towards * relative.velocity)
+    return float(min(np.hypot(*one), np.hypot(*part)))
+
+
 def move_alike(mind: Mind, pair: Pair) -> bool:
     """Whether two fast bodies move alike, so that a gap between them does not mean that they have separated.
 
@@ -128,8 +146,8 @@ def move_alike(mind: Mind, pair: Pair) -> bool:
     return bool(fast and relative_speed < ALONG_SHARE * shared_speed)
 
 
-def own_speed(mind: Mind, number: int) -> float | None:
-    """Speed of a body, pixels per second: the smaller of outline motion and image motion; None if unknown.
+def own_velocity(mind: Mind, number: int) -> tuple[float, float] | None:
+    """Velocity of a body, pixels per second: the smaller of outline motion and image motion; None if unknown.
 
     The outline of a body that is being covered recedes as fast as its occluder advances, and that of an
     approaching body grows; image motion is free of both effects.
@@ -137,11 +155,18 @@ def own_speed(mind: Mind, number: int) -> float | None:
     An approximation: image motion contains the camera's. A body followed by a moving camera counts as slow,
     and must rest relative to another one for longer before the two count as coupled.
     """
-    body = mind.objects[number]
-    speeds = [kinematics(mind).one("speed", number)]
+    body, now = mind.objects[number], kinematics(mind)
+    found = [now.velocity[now.ids.index(number)]] if number in now.ids else []
     if body.last_seen == mind.time and body.region.velocity_sigma > 0.0:
-        speeds.append(float(np.hypot(*body.region.velocity)))
-    return min((s for s in speeds if s == s), default=None)  # NaN is not equal to itself
+        found.append(np.asarray(body.region.velocity))
+    known = [(float(v[0]), float(v[1])) for v in found if not np.isnan(v).any()]
+    return min(known, key=lambda v: math.hypot(*v), default=None)
+
+
+def own_speed(mind: Mind, number: int) -> float | None:
+    """The speed that belongs to `own_velocity`, pixels per second."""
+    velocity = own_velocity(mind, number)
+    return None if velocity is None else math.hypot(*velocity)
 
 
 def observed_pairs(table: RelationTable, mind: Mind) -> list[PairObservation]:

@@ -45,7 +45,7 @@ from visup.rules.coupling.evidence import (
     CouplingEvidence,
     Pair,
     PairObservation,
-    common_speed,
+    common_speed_nearby,
     coupling_cells,
     feet_of,
     move_alike,
@@ -274,7 +274,7 @@ class CouplingReasoner(ExplainableReasoner):
         """
         s, elapsed = self.settings, mind.time - (before.path_end if before else mind.time)
         diagonal = image_diagonal(mind.frame_size)
-        shared_speed = common_speed(mind, seen.pair)
+        shared_speed = common_speed_nearby(mind, seen.pair, before, relative)
         still = max(s.relations.still_speed * diagonal, s.still_share * shared_speed)
         moving = max(s.moving_speed * diagonal, s.moving_share * shared_speed)
         log_odds = relative.rest_odds(still, moving)
@@ -291,8 +291,8 @@ class CouplingReasoner(ExplainableReasoner):
     ) -> OutlineContact:
         """The updated contact of two outlines that meet: whether one passes the other."""
         s, track = self.settings.contact, before.relative_track
-        limit = s.passing * image_diagonal(mind.frame_size)
-        limit = max(limit, s.passing_share * common_speed(mind, seen.pair))
+        shared = s.passing_share * common_speed_nearby(mind, seen.pair, track, found)
+        limit = max(s.passing * image_diagonal(mind.frame_size), shared)
         speed = None if found is None else float(np.hypot(*found.velocity))
         dt = mind.time - track.path_end if track is not None else 0.0
         moment, crossed = (mind.time, dt), before.contact.path if before.contact else 0.0
@@ -350,7 +350,8 @@ class CouplingReasoner(ExplainableReasoner):
         text = "log odds that they touch and are at rest"
         together = mind.truth("moving_together", *seen.pair) is Truth.TRUE
         least = 2.0 * s.relations.still_speed * image_diagonal(mind.frame_size)
-        moving = common_speed(mind, seen.pair) > least
+        relative = None if track is None else relative_velocity(track, mind.time, s.window_s)
+        moving = common_speed_nearby(mind, seen.pair, track, relative) > least
         # `moving_together` was established over a window of its own, so that less evidence suffices.
         share = 0.4 if together else s.carried_share if moving else 1.0
         yield at_least(text, evidence.rest_odds, share * s.odds)

@@ -3,12 +3,18 @@
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from tests.rules.runs import Thought, reason
 from tests.rules.scenes import box_region, seen
 from visup.agent import Observation, Region, Truth
-from visup.rules.coupling.evidence import common_speed
+from visup.rules.coupling.evidence import common_speed, common_speed_nearby
+from visup.rules.coupling.relative_motion import (
+    OutlineTemplate,
+    RelativeTrack,
+    RelativeVelocity,
+)
 
 Place = Callable[[float], float]
 
@@ -187,6 +193,30 @@ def test_what_is_being_covered_goes_no_faster_than_its_image_motion() -> None:
     seen_now = [m for m in minds if m.objects[1].last_seen == m.time]
     assert len(seen_now) > 50
     assert all(common_speed(m, (1, 2)) <= 0.5 for m in seen_now)
+
+
+@pytest.mark.parametrize(
+    ("local", "relative", "speed"),
+    [
+        ((True, False), 0.0, 40.0),  # its hand goes where the cup goes
+        ((True, False), 30.0, 10.0),
+        ((True, False), 40.0, 0.0),  # its hand rests, too
+        ((False, False), 0.0, 0.0),
+        ((True, True), 0.0, 0.0),
+        ((False, True), 0.0, 0.0),
+    ],
+)
+def test_of_an_arm_only_what_is_near_the_other_body_counts(
+    local: tuple[bool, bool], relative: float, speed: float
+) -> None:
+    """An arm rests as a whole, beside a cup that goes to the right at 40 px/s."""
+    boxes = [[(100, 100, 200, 300), (302 + 1.6 * i, 150, 40, 40)] for i in range(50)]
+    observed = (seen(i, [box_region(1, a), box_region(2, b)]) for i, (a, b) in enumerate(boxes))
+    mind = reason(observed)[-1].mind
+    arm, cup = (OutlineTemplate(np.zeros((0, 2)), np.zeros((0, 2)), local=k) for k in local)
+    velocity = RelativeVelocity(np.array([relative, 0.0]), np.eye(2), 0.3)
+    found = common_speed_nearby(mind, (1, 2), RelativeTrack(arm, cup, 0.0), velocity)
+    assert found == pytest.approx(speed, abs=0.5)
 
 
 @pytest.mark.parametrize(("slowdown", "parts"), [(0.0, False), (0.2, False), (0.8, True)])
