@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 
+import numpy as np
+
 from visup.agent import Mind, StageBelief, Status, TaskBelief
 from visup.agent.model.fast_replace import replace
-from visup.rules.relations.reasoner import sample_window
+from visup.rules.geometry.regions import image_diagonal
+from visup.rules.relations.reasoner import relation_settings, sample_window
 from visup.tasks.automaton.states import TaskStep, leaves
 from visup.tasks.supervision.hypotheses import HOLD, TaskHypotheses
 from visup.tasks.supervision.memory import TaskMemory
@@ -90,8 +93,10 @@ def stage_onsets(
 
 
 CAME_LATER_S = 0.3
-"""An object that appears this long after the first one, seconds, has arrived or started to move; either
-begins a task."""
+"""An object that appears this long after the first one, seconds, has come in, or was found since it has
+started to move; either begins a task."""
+
+MOVING_SIGMAS = 3.0  # standard deviations of its image motion from which it moves
 
 
 def begun_by_motion(
@@ -170,13 +175,7 @@ def _shows_motion(snapshot: TaskSnapshot, posterior: TaskHypotheses | None) -> b
     if posterior is None or posterior.likeliest.finished is not None:
         return False
     steps = [x.step for x in leaves(posterior.likeliest.state)]
-    actors = {a for step in steps for a in step.actors}
-    ids, mind = snapshot.objects(tuple(actors)), snapshot.mind
-    came = [mind.objects[i].first_seen for i in ids if i in mind.objects]
-    start = min((b.first_seen for b in mind.objects.values()), default=0.0)
-    if came and max(came) - start > CAME_LATER_S:
-        return True
-    out = moving_bodies(mind)
+    out = moving_bodies(snapshot.mind) | _newcomers(snapshot.mind)
 
     def stirs(step: TaskStep, *, alone: bool) -> bool:
         leads = step.actors[:1] if step.action in TRENDS and not alone else step.actors
@@ -184,3 +183,20 @@ def _shows_motion(snapshot: TaskSnapshot, posterior: TaskHypotheses | None) -> b
 
     stages = [[s for s in steps if s.stage == stage] for stage in {s.stage for s in steps}]
     return any(all(stirs(s, alone=len(stage) == 1) for s in stage) for stage in stages)
+
+
+def _newcomers(mind: Mind) -> frozenset[int]:
+    """Ids of the objects that have appeared later than the first ones, except those found at rest.
+
+    They are judged by their image motion, since it is not known yet how their outlines move. Where no image
+    motion is measured, all of them count.
+    """
+    start = min((b.first_seen for b in mind.objects.values()), default=0.0)
+    late = frozenset(i for i, b in mind.objects.items() if b.first_seen - start > CAME_LATER_S)
+    window = sample_window(mind)
+    if not late or not np.isfinite(window.image).any():
+        return late
+    vx, vy, sigma = window.image[-1].T
+    least = relation_settings(mind).slow_speed * image_diagonal(mind.frame_size)
+    moves = np.hypot(vx, vy) > np.maximum(least, MOVING_SIGMAS * sigma)
+    return late & {i for i, m in zip(window.ids, moves.tolist(), strict=True) if m}

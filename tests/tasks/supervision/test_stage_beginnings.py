@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import pytest
 
+from tests.rules.runs import reason
+from tests.rules.scenes import box_region, seen
 from tests.tasks.scripted import ARM, IDENTITIES, INTRUDER, SATELLITE, RelationSpan, Script, watch
 from tests.tasks.supervision.drawn import Box, Mask, drawn, first, watched
+from visup.agent import Observation, Region
 from visup.tasks.supervision import stage_beginnings
 
 APPROACH = "<t> ::= converging(arm, satellite)"
@@ -34,6 +38,34 @@ def test_an_approach_begins_when_the_objects_converge(since: float) -> None:
 def test_an_actor_that_enters_later_begins_the_task() -> None:
     objects = {ARM: (0.0, 1e9), SATELLITE: (3.0, 1e9)}
     assert begun(Script(objects=objects), APPROACH)["t"] == pytest.approx(3.0, abs=0.11)
+
+
+@pytest.mark.parametrize(
+    ("velocity", "comes"),
+    [((0.0, 0.0), False), ((5.0, 0.0), False), ((40.0, 0.0), True), (None, True)],
+)
+def test_an_actor_that_is_found_late_begins_the_task_unless_it_is_found_at_rest(
+    velocity: tuple[float, float] | None, comes: bool
+) -> None:
+    """Where no image motion is measured, it may have come in."""
+
+    def at(i: int) -> Observation:
+        regions = [box_region(ARM, (100, 100, 60, 60))]
+        regions += [box_region(SATELLITE, (300, 100, 60, 60))] if i >= LATE else []
+        measured = () if velocity is None else (velocity, 1.0)
+        return seen(i, [_measured(r, *measured) for r in regions if r is not None])
+
+    mind = reason(at(i) for i in range(LATE + 12))[-1].mind
+    assert stage_beginnings._newcomers(mind) == (frozenset({SATELLITE}) if comes else frozenset())
+
+
+LATE = 20
+
+
+def _measured(
+    region: Region, velocity: tuple[float, float] = (0.0, 0.0), sigma: float = 0.0
+) -> Region:
+    return replace(region, velocity=velocity, velocity_sigma=sigma)
 
 
 def carried(*spans: RelationSpan) -> Script:
