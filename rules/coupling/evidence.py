@@ -118,7 +118,7 @@ def common_speed(mind: Mind, pair: Pair) -> float:
 def common_speed_nearby(
     mind: Mind, pair: Pair, track: RelativeTrack | None, relative: RelativeVelocity | None
 ) -> float:
-    """The same where a body counts only near the other one: an arm as a whole is slower than its hand.
+    """`common_speed` with only the part of a larger body near the other one: an arm is slower than its hand.
 
     The velocity of the part near the other body is that of the other body, changed by their relative one.
     """

@@ -9,6 +9,7 @@ import numpy as np
 from visup.agent import Mind, StageBelief, Status, TaskBelief
 from visup.agent.model.fast_replace import replace
 from visup.rules.geometry.regions import image_diagonal
+from visup.rules.predicates.motion import MOVING_SIGMAS
 from visup.rules.relations.reasoner import relation_settings, sample_window
 from visup.tasks.automaton.states import TaskStep, leaves
 from visup.tasks.supervision.hypotheses import HOLD, TaskHypotheses
@@ -95,8 +96,6 @@ def stage_onsets(
 CAME_LATER_S = 0.3
 """An object that appears this long after the first one, seconds, has come in, or was found since it has
 started to move; either begins a task."""
-
-MOVING_SIGMAS = 3.0  # standard deviations of its image motion from which it moves
 
 
 def begun_by_motion(

@@ -25,7 +25,7 @@ Floats = NDArray[np.float32]
 
 _BLUR = 1.5  # standard deviation of the smoothing that makes brightness linear, working pixels
 _MARGIN = 2  # how far the compared pixels extend beyond the outline, working pixels
-_MOST_PIXELS = 4000  # most pixels that are compared
+_MAX_PIXELS = 4000  # most pixels that are compared
 _CERTAIN = 0.5  # explained share of the change from which it is a shift, not an occluder or light
 
 
@@ -112,7 +112,7 @@ def _compared_pixels(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
     """(N,) int64: indices of pixels on an object and just beyond its outline, evenly thinned out."""
     size = 2 * _MARGIN + 1
     near = cv2.dilate(mask.view(np.uint8), np.ones((size, size), np.uint8))
-    step = int(np.ceil(np.sqrt(np.count_nonzero(near) / _MOST_PIXELS)))
+    step = int(np.ceil(np.sqrt(np.count_nonzero(near) / _MAX_PIXELS)))
     thin = np.zeros_like(near)
     thin[::step, ::step] = near[::step, ::step]
     return np.flatnonzero(thin)
