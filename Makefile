@@ -13,11 +13,12 @@ unexport PYTHONDONTWRITEBYTECODE
 setup: $(COMPILED)
 
 # The plain way of an editable install (a path, no import hook) is what type checkers and editors can follow.
+# Python keeps the bytecode of what is imported; pip would make that of all modules, which takes a minute.
 $(STAMP): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "visup needs Python 3.11 or newer")'
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt setuptools
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt \
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile -c constraints.txt \
 	  --config-settings editable_mode=compat -e '.[dev]'
 	touch $@
 
