@@ -20,6 +20,12 @@ from visup.percepts.appearance.models.appearance_model import view_models
 from visup.percepts.appearance.models.blob import Blob
 from visup.percepts.appearance.models.scene import Scene, prepare_scene
 from visup.percepts.appearance.output.object_region import confidence, object_outline, object_region
+from visup.percepts.appearance.output.severed_parts import (
+    Support,
+    joined,
+    update_support,
+    with_parts,
+)
 from visup.percepts.appearance.output.unexplained_regions import (
     moving_body,
     region_iou,
@@ -58,17 +64,24 @@ class AppearanceBehaviour:
         self._tracker = TaughtObjectTracker(view_models(taught))
         self._relit: tuple[tuple[int, TaughtView], ...] | None = None
         self._drawn: dict[str, tuple[Blob, RegionOutline | None]] = {}
+        self._parts: Support = {}
 
     def save(self) -> Mapping[str, Any]:
         """The state after the frames so far; see `visup.agent.storage.checkpoint`."""
         tracker = self._tracker.save()
-        return {"motion": self._motion.save(), "tracker": tracker, "relit": self._relit}
+        return {
+            "motion": self._motion.save(),
+            "tracker": tracker,
+            "relit": self._relit,
+            "parts": self._parts,
+        }
 
     def load(self, state: Mapping[str, Any]) -> None:
         """Restore the state of a behaviour with the same settings."""
         self._motion.load(state["motion"])
         self._add_relit_views(state["relit"])
         self._tracker.load(state["tracker"])
+        self._parts = state["parts"]
 
     def missed(self, observation: Observation) -> None:
         """Reserve the ids of regions reported since the restored state."""
@@ -103,9 +116,10 @@ class AppearanceBehaviour:
         before = None if last is None else last.time
         outlined = [(t, self._outline(t, scene)) for t in tracks]
         objects = [(t, object_region(t, o, scene, before)) for t, o in outlined if o is not None]
-        known = {t.id for t in tracks}
-        moving = [r for r in moving if r.id not in known]
+        shown = {r.id for _, r in objects}
+        moving = [r for r in moving if r.id not in shown]
         others = unexplained(moving, [r for _, r in objects], frame.size)
+        objects, others = self._with_parts(objects, others, scene)
         regions = sorted([*others, *(r for _, r in objects)], key=lambda r: r.id)
         camera = self._tracker.camera
         return [
@@ -117,6 +131,23 @@ class AppearanceBehaviour:
             *(self._percept(frame, "region", r, r.confidence) for r in regions),
             *(self._hypothesis(frame, t, r) for t, r in objects),
         ]
+
+    def _with_parts(
+        self,
+        objects: Sequence[tuple[TaughtObjectTrack, Region]],
+        others: Sequence[Region],
+        scene: Scene,
+    ) -> tuple[list[tuple[TaughtObjectTrack, Region]], tuple[Region, ...]]:
+        """The objects, each with its pieces that are joined outside of the image; and the other regions."""
+        seen = [(r, t.appearance) for t, r in objects if t.appearance is not None]
+        self._parts = update_support(self._parts, seen, others, scene)
+        shown = {r.id for _, r in objects}
+        owner = {p: t for t, p in joined(self._parts) if t in shown}
+        whole = [
+            (t, with_parts(r, (p for p in others if owner.get(p.id) == r.id), scene.frame_size))
+            for t, r in objects
+        ]
+        return whole, tuple(r for r in others if r.id not in owner)
 
     def _add_relit_views(self, views: tuple[tuple[int, TaughtView], ...] | None) -> None:
         """Add views whose colours are adapted to the video's lighting, if it differs; see `relit_views`."""

@@ -47,8 +47,9 @@ def picture(
     masks: dict[str, Mask] = {}
     for name, (x, y) in places.items():
         part = thing(name)
-        x0, y0, x1, y1 = max(x, 0), max(y, 0), min(x + part.shape[1], WIDTH), y + part.shape[0]
-        image[y0:y1, x0:x1] = part[y0 - y :, x0 - x : x1 - x]
+        x0, y0 = max(x, 0), max(y, 0)
+        x1, y1 = min(x + part.shape[1], WIDTH), min(y + part.shape[0], HEIGHT)
+        image[y0:y1, x0:x1] = part[y0 - y : y1 - y, x0 - x : x1 - x]
         here = np.zeros((HEIGHT, WIDTH), dtype=bool)
         here[y0:y1, x0:x1] = True
         masks = {n: m & ~here for n, m in masks.items()} | {name: here}
