@@ -195,6 +195,14 @@ def unexplained(
     return tuple(o.id for o, is_free in zip(strange, free, strict=True) if is_free)
 
 
+def familiar_objects(
+    mind: Mind, bindings: tuple[Binding, ...], settings: TaskSettings, before: tuple[int, ...] = ()
+) -> tuple[int, ...]:
+    """Ids of all objects that have ever been scenery or handlers; `before` are those of the last step."""
+    known = {*scenery(mind, bindings, settings), *handlers(mind, bindings, settings)}
+    return tuple(sorted(known.union(before)))
+
+
 def handlers(
     mind: Mind, bindings: Sequence[Binding], settings: TaskSettings = DEFAULT_SETTINGS
 ) -> tuple[int, ...]:

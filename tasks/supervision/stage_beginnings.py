@@ -28,7 +28,10 @@ REST_S = 0.3
 
 
 def with_begun(
-    before: tuple[StageBelief, ...], stages: tuple[StageBelief, ...], moved: Collection[str] = ()
+    before: tuple[StageBelief, ...],
+    stages: tuple[StageBelief, ...],
+    moved: Collection[str] = (),
+    waiting: Collection[str] = (),
 ) -> tuple[StageBelief, ...]:
     """Update whether each stage has begun.
 
@@ -36,11 +39,20 @@ def with_begun(
         before: The previous beliefs, in the same order.
         stages: The present beliefs.
         moved: The stages that begin by motion of their actors, if they are active.
+        waiting: The stages that no progress begins; they are active until they begin otherwise.
     """
-    pairs = zip(before, stages, strict=True)
+    still = {s for s in waiting if s not in moved}
+    pairs = [
+        (b, _waiting(s) if s.stage in still else s) for b, s in zip(before, stages, strict=True)
+    ]
     return tuple(
         [replace(s, begun=True) if _begun(b, s, s.stage in moved) else s for b, s in pairs]
     )
+
+
+def _waiting(stage: StageBelief) -> StageBelief:
+    going = stage.status is Status.PROGRESSING
+    return replace(stage, status=Status.ACTIVE, begun=False) if going else stage
 
 
 def is_first(stages: tuple[StageBelief, ...]) -> bool:
@@ -171,17 +183,45 @@ def _shows_motion(snapshot: TaskSnapshot, posterior: TaskHypotheses | None) -> b
     Of a stage with several steps, an actor of each must move; for a trend, the actor named first: that the
     giver brings a payload does not begin what the receiver should do.
     """
-    if posterior is None or posterior.likeliest.finished is not None:
-        return False
-    steps = [x.step for x in leaves(posterior.likeliest.state)]
     out = moving_bodies(snapshot.mind) | _newcomers(snapshot.mind)
 
     def stirs(step: TaskStep, *, alone: bool) -> bool:
         leads = step.actors[:1] if step.action in TRENDS and not alone else step.actors
         return not out.isdisjoint(snapshot.objects(leads))
 
-    stages = [[s for s in steps if s.stage == stage] for stage in {s.stage for s in steps}]
+    stages = _stages(posterior).values()
     return any(all(stirs(s, alone=len(stage) == 1) for s in stage) for stage in stages)
+
+
+def waiting_for_leads(
+    before: TaskBelief, snapshot: TaskSnapshot, posterior: TaskHypotheses | None
+) -> frozenset[str]:
+    """The first stages of several steps that do not begin yet, since of a trend only the second actor moves.
+
+    A giver that brings the payload nearer to the receiver is progress of `converging(receiver, payload)`,
+    but the receiver has not begun.
+    """
+    if not is_first(before.stages):
+        return frozenset()
+    out = moving_bodies(snapshot.mind) | _newcomers(snapshot.mind)
+
+    def waits(step: TaskStep) -> bool:
+        lead, others = snapshot.objects(step.actors[:1]), snapshot.objects(step.actors[1:])
+        rests = bool(lead) and out.isdisjoint(lead)
+        return step.action in TRENDS and rests and not out.isdisjoint(others)
+
+    stages = _stages(posterior).items()
+    return frozenset(name for name, steps in stages if len(steps) > 1 and any(map(waits, steps)))
+
+
+def _stages(posterior: TaskHypotheses | None) -> dict[str, list[TaskStep]]:
+    """The most likely active steps by stage."""
+    if posterior is None or posterior.likeliest.finished is not None:
+        return {}
+    found: dict[str, list[TaskStep]] = {}
+    for leaf in leaves(posterior.likeliest.state):
+        found.setdefault(leaf.step.stage, []).append(leaf.step)
+    return found
 
 
 def _newcomers(mind: Mind) -> frozenset[int]:

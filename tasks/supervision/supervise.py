@@ -28,9 +28,8 @@ from visup.tasks.automaton.backpointers import Revision, behind
 from visup.tasks.automaton.states import leaves
 from visup.tasks.casting.matching import (
     bystanders,
-    handlers,
+    familiar_objects,
     machines,
-    scenery,
     unexplained,
 )
 from visup.tasks.casting.recasting import Casting, recast
@@ -65,6 +64,7 @@ from visup.tasks.supervision.stage_beginnings import (
     begun_by_motion,
     stage_onsets,
     stages_at_rest,
+    waiting_for_leads,
     with_begun,
 )
 from visup.tasks.supervision.task_inference import ALONE, TaskActivity, updated_activities
@@ -234,7 +234,7 @@ def _follow(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> TaskMemor
     snapshot = TaskSnapshot(mind, casting.bindings, model, observations)
     posterior = followed(model, start, snapshot)
     broken = broken_since(model, snapshot, memory)
-    familiar = _familiar_objects(snapshot, memory, model.settings)
+    familiar = familiar_objects(mind, casting.bindings, model.settings, memory.familiar_objects)
     bystanding = bystanders(model.task, mind, casting.bindings, model.settings)
     interrupted, interrupting = _interrupted(model, snapshot, memory, broken, bystanding)
     interrupted_now = interrupted != memory.interrupted and not interrupting
@@ -285,10 +285,11 @@ def _belief(
     if memory.forbidden:
         belief = replace(belief, stages=old.stages, current=old.current)
     moved = begun_by_motion(model, memory, new.resting, snapshot, new.posterior)
+    waiting = waiting_for_leads(old, snapshot, new.posterior)
     least = model.settings.unexplained_s
     return replace(
         belief,
-        stages=with_begun(old.stages, belief.stages, moved),
+        stages=with_begun(old.stages, belief.stages, moved, waiting),
         unexplained=tuple(i for i, since in new.unexplained_since if now - since >= least),
         bystanders=bystanding,
         machines=machines(model.task, snapshot.bindings),
@@ -314,15 +315,6 @@ def _cast(model: MonitoredPhases, memory: TaskMemory, mind: Mind) -> Casting:
     steps = () if memory.posterior is None else leaves(memory.posterior.likeliest.state)
     acting = tuple(a for x in steps for a in x.step.actors)
     return recast(model.task, mind, before, acting, model.settings)
-
-
-def _familiar_objects(
-    snapshot: TaskSnapshot, memory: TaskMemory, settings: TaskSettings
-) -> tuple[int, ...]:
-    """See `TaskMemory.akin`."""
-    mind, bindings = snapshot.mind, snapshot.bindings
-    known = {*scenery(mind, bindings, settings), *handlers(mind, bindings, settings)}
-    return tuple(sorted(known.union(memory.familiar_objects)))
 
 
 def _awaited(model: MonitoredPhases, casting: Casting) -> bool:
