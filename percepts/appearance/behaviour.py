@@ -138,7 +138,7 @@ class AppearanceBehaviour:
         others: Sequence[Region],
         scene: Scene,
     ) -> tuple[list[tuple[TaughtObjectTrack, Region]], tuple[Region, ...]]:
-        """The objects, each with its pieces that are joined outside of the image; and the other regions."""
+        """The objects, each with its severed parts; and the other regions."""
         seen = [(r, t.appearance) for t, r in objects if t.appearance is not None]
         self._parts = update_support(self._parts, seen, others, scene)
         shown = {r.id for _, r in objects}

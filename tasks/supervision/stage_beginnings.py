@@ -201,7 +201,8 @@ def waiting_for_leads(
     A giver that brings the payload nearer to the receiver is progress of `converging(receiver, payload)`,
     but the receiver has not begun.
     """
-    if not is_first(before.stages):
+    several = {name: steps for name, steps in _stages(posterior).items() if len(steps) > 1}
+    if not several or not is_first(before.stages):
         return frozenset()
     out = moving_bodies(snapshot.mind) | _newcomers(snapshot.mind)
 
@@ -210,8 +211,7 @@ def waiting_for_leads(
         rests = bool(lead) and out.isdisjoint(lead)
         return step.action in TRENDS and rests and not out.isdisjoint(others)
 
-    stages = _stages(posterior).items()
-    return frozenset(name for name, steps in stages if len(steps) > 1 and any(map(waits, steps)))
+    return frozenset(name for name, steps in several.items() if any(map(waits, steps)))
 
 
 def _stages(posterior: TaskHypotheses | None) -> dict[str, list[TaskStep]]:

@@ -1,6 +1,6 @@
 """Parts of a taught object that are joined outside of the image: an arm whose elbow is out of view.
 
-Motion segmentation reports the other piece as a region of its own. It belongs to the object if the same
+Motion segmentation reports the other part as a region of its own. It belongs to the object if the same
 border of the image cuts both, no farther apart than they are long, and if it has the object's colours. The
 price: of two bodies of the same colours that leave the image side by side, one of them not taught, the other
 is taken for a part of it.
@@ -22,8 +22,8 @@ from visup.percepts.motion.outlines.region_outline import describe_mask
 
 MIN_EXCESS = 0.3  # least excess of the object's colours in the region over those around it
 MIN_SHARED = 0.3  # least intersection of the colour histograms of region and object
-JOINED = 3  # frames in which a region must appear to belong to an object
-MOST = 2 * JOINED  # most such frames that are counted
+MIN_SUPPORT = 3  # frames in which a region must appear to belong to an object
+MAX_SUPPORT = 2 * MIN_SUPPORT  # most such frames that are counted
 
 Interval = tuple[int, int]
 Support = Mapping[tuple[int, int], int]
@@ -47,12 +47,12 @@ def update_support(
     """
     found = {pair: count for pair, count in before.items() if any(r.id == pair[1] for r in others)}
     for region in others:
-        for thing, appearance in objects:
-            if not _meet_outside(thing, region, scene):
+        for taught, appearance in objects:
+            if not _meet_outside(taught, region, scene):
                 continue
-            pair = thing.id, region.id
+            pair = taught.id, region.id
             alike = _has_colours_of(appearance, region, scene)
-            count = min(found.get(pair, 0) + (1 if alike else -1), MOST)
+            count = min(found.get(pair, 0) + (1 if alike else -1), MAX_SUPPORT)
             if count > 0:
                 found[pair] = count
             else:
@@ -62,7 +62,7 @@ def update_support(
 
 def joined(support: Support) -> list[tuple[int, int]]:
     """The pairs of an object and a region that belong together, the best supported last."""
-    sure = ((count, pair) for pair, count in support.items() if count >= JOINED)
+    sure = ((count, pair) for pair, count in support.items() if count >= MIN_SUPPORT)
     return [pair for _, pair in sorted(sure)]
 
 
@@ -93,39 +93,39 @@ def cut_ends(region: Region, size: tuple[int, int]) -> dict[str, Interval]:
     }
 
 
-def with_parts(thing: Region, parts: Iterable[Region], size: tuple[int, int]) -> Region:
-    """An object with its other pieces, as one region of several parts.
+def with_parts(taught: Region, parts: Iterable[Region], size: tuple[int, int]) -> Region:
+    """An object and its severed parts as one region.
 
     Args:
-        thing: Its own region.
-        parts: Its other pieces.
+        taught: The object's own region.
+        parts: Its other parts.
         size: (width, height) of the frame.
 
     Returns:
-        The region, with the mean velocity of its pixels; without an affine motion, since the pieces turn
+        The region, with the mean velocity of its pixels; without an affine motion, since the parts turn
         about joints.
     """
-    pieces = [thing, *parts]
-    if len(pieces) == 1:
-        return thing
-    boxes = np.array([p.bbox for p in pieces])
+    regions = [taught, *parts]
+    if len(regions) == 1:
+        return taught
+    boxes = np.array([r.bbox for r in regions])
     left, top = boxes[:, :2].min(axis=0).tolist()
     right, bottom = (boxes[:, :2] + boxes[:, 2:]).max(axis=0).tolist()
     mask = np.zeros((bottom - top, right - left), dtype=bool)
-    for piece in pieces:
-        x, y, w, h = piece.bbox
-        mask[y - top : y - top + h, x - left : x - left + w] |= piece.mask
-    areas = [p.area for p in pieces]
-    vx, vy = np.average([p.velocity for p in pieces], axis=0, weights=areas).tolist()
-    sigma = max(p.velocity_sigma for p in pieces)
-    whole = describe_mask(mask, (left, top), size).applied_to(thing)
+    for r in regions:
+        x, y, w, h = r.bbox
+        mask[y - top : y - top + h, x - left : x - left + w] |= r.mask
+    areas = [r.area for r in regions]
+    vx, vy = np.average([r.velocity for r in regions], axis=0, weights=areas).tolist()
+    sigma = max(r.velocity_sigma for r in regions)
+    whole = describe_mask(mask, (left, top), size).applied_to(taught)
     return replace(whole, velocity=(vx, vy), velocity_sigma=sigma, motion=None)
 
 
-def _meet_outside(thing: Region, region: Region, scene: Scene) -> bool:
+def _meet_outside(taught: Region, region: Region, scene: Scene) -> bool:
     """Whether the same border cuts both, no farther apart along it than the longer one is long."""
-    reach = max(*thing.bbox[2:], *region.bbox[2:])
-    ends, other = cut_ends(region, scene.frame_size), cut_ends(thing, scene.frame_size)
+    reach = max(*taught.bbox[2:], *region.bbox[2:])
+    ends, other = cut_ends(region, scene.frame_size), cut_ends(taught, scene.frame_size)
     gaps = [
         max(ends[side][0] - other[side][1], other[side][0] - ends[side][1])
         for side in ends.keys() & other.keys()

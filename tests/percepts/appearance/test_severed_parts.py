@@ -15,7 +15,7 @@ from visup.percepts.appearance.behaviour import AppearanceBehaviour
 from visup.percepts.appearance.models.appearance_model import view_models
 from visup.percepts.appearance.models.scene import prepare_scene
 from visup.percepts.appearance.output.severed_parts import (
-    JOINED,
+    MIN_SUPPORT,
     Support,
     cut_ends,
     joined,
@@ -28,10 +28,8 @@ from visup.percepts.motion.outlines.region_outline import describe_mask
 Places = Mapping[str, tuple[int, int]]
 (PART,) = view_models(shown({"part": (40, 60)}, "part"))
 SIZE = (WIDTH, HEIGHT)
-TOP: Places = {
-    "part": (60, -8),
-    "twin": (110, -6),
-}  # two pieces of one colour, cut by the upper border
+# Two parts of one colour that the upper border cuts.
+TOP: Places = {"part": (60, -8), "twin": (110, -6)}
 
 
 def region(number: int, mask: Mask, velocity: tuple[float, float] = (0.0, 0.0)) -> Region:
@@ -52,8 +50,8 @@ def supported(
 
 
 def test_a_piece_of_its_colours_at_the_same_border_is_a_part() -> None:
-    assert joined(supported(TOP, JOINED)) == [(1, 2)]
-    assert joined(supported(TOP, JOINED - 1)) == []
+    assert joined(supported(TOP, MIN_SUPPORT)) == [(1, 2)]
+    assert joined(supported(TOP, MIN_SUPPORT - 1)) == []
 
 
 @pytest.mark.parametrize(
@@ -66,11 +64,11 @@ def test_a_piece_of_its_colours_at_the_same_border_is_a_part() -> None:
     ],
 )
 def test_what_is_not_joined_outside_is_none(places: Places, other: str) -> None:
-    assert joined(supported(places, 2 * JOINED, other=other)) == []
+    assert joined(supported(places, 2 * MIN_SUPPORT, other=other)) == []
 
 
 def test_a_part_stays_one_within_the_image_and_no_longer_than_its_region() -> None:
-    found = supported(TOP, 2 * JOINED)
+    found = supported(TOP, 2 * MIN_SUPPORT)
     inside = supported({"part": (60, -8), "twin": (110, 20)}, 20, found)
     assert joined(inside) == [(1, 2)]
     image, masks = picture(TOP)
@@ -81,11 +79,11 @@ def test_a_part_stays_one_within_the_image_and_no_longer_than_its_region() -> No
 
 
 def test_contrary_colours_end_it() -> None:
-    found = supported(TOP, 10 * JOINED)
-    assert joined(supported({"part": (60, -8), "tray": (110, -6)}, JOINED, found, "tray")) == [
+    found = supported(TOP, 10 * MIN_SUPPORT)
+    assert joined(supported({"part": (60, -8), "tray": (110, -6)}, MIN_SUPPORT, found, "tray")) == [
         (1, 2)
     ]
-    assert supported({"part": (60, -8), "tray": (110, -6)}, 2 * JOINED, found, "tray") == {}
+    assert supported({"part": (60, -8), "tray": (110, -6)}, 2 * MIN_SUPPORT, found, "tray") == {}
 
 
 boxes = st.tuples(
@@ -152,7 +150,7 @@ def test_an_object_is_reported_with_its_piece_and_the_piece_is_not() -> None:
     behaviour = AppearanceBehaviour(shown({"part": (40, 60)}, "part"), motion)
     start: Places = {"part": (60, 40)}
     rises = [{"part": (60, 40 - 6 * k), "twin": (110, -6)} for k in range(9)]
-    course = [start, *rises, *[rises[-1]] * JOINED]
+    course = [start, *rises, *[rises[-1]] * MIN_SUPPORT]
     for number, places in enumerate(course):
         masks = picture(places)[1]
         motion.regions = [region(9, masks["twin"])] if "twin" in masks else []
