@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from visup.agent.model.fast_replace import replace
 from visup.rules.geometry.regions import image_diagonal
 from visup.rules.predicates.motion import MOVING_SIGMAS
 from visup.rules.relations.reasoner import relation_settings, sample_window
-from visup.tasks.automaton.states import TaskStep, leaves
+from visup.tasks.automaton.states import Leaf, TaskStep, leaves
 from visup.tasks.supervision.hypotheses import HOLD, TaskHypotheses
 from visup.tasks.supervision.memory import TaskMemory
 from visup.tasks.supervision.monitored_phases import MonitoredPhases
@@ -19,6 +19,7 @@ from visup.tasks.supervision.snapshot import TaskSnapshot
 from visup.tasks.verification.motion_onset import moving_bodies
 from visup.tasks.verification.observe import TRENDS
 from visup.tasks.verification.stage_onset import stage_onset
+from visup.tasks.verification.step_monitor import StepMonitor
 
 Resting = tuple[tuple[str, float], ...]
 """Stages that wait to begin, each with the time since when its actors rest, seconds."""
@@ -190,7 +191,7 @@ def _shows_motion(snapshot: TaskSnapshot, posterior: TaskHypotheses | None) -> b
         return not out.isdisjoint(snapshot.objects(leads))
 
     stages = _stages(posterior).values()
-    return any(all(stirs(s, alone=len(stage) == 1) for s in stage) for stage in stages)
+    return any(all(stirs(x.step, alone=len(stage) == 1) for x in stage) for stage in stages)
 
 
 def waiting_for_leads(
@@ -199,7 +200,7 @@ def waiting_for_leads(
     """The first stages of several steps that do not begin yet, since of a trend only the second actor moves.
 
     A giver that brings the payload nearer to the receiver is progress of `converging(receiver, payload)`,
-    but the receiver has not begun.
+    but the receiver has not begun. Another action of the stage that begins in its turn begins the stage.
     """
     several = {name: steps for name, steps in _stages(posterior).items() if len(steps) > 1}
     if not several or not is_first(before.stages):
@@ -211,16 +212,20 @@ def waiting_for_leads(
         rests = bool(lead) and out.isdisjoint(lead)
         return step.action in TRENDS and rests and not out.isdisjoint(others)
 
-    return frozenset(name for name, steps in several.items() if any(map(waits, steps)))
+    def held_back(steps: Sequence[Leaf[StepMonitor]]) -> bool:
+        going = [x for x in steps if not waits(x.step)]
+        return len(going) < len(steps) and not any(x.payload.begun_anew for x in going)
+
+    return frozenset(name for name, steps in several.items() if held_back(steps))
 
 
-def _stages(posterior: TaskHypotheses | None) -> dict[str, list[TaskStep]]:
+def _stages(posterior: TaskHypotheses | None) -> dict[str, list[Leaf[StepMonitor]]]:
     """The most likely active steps by stage."""
     if posterior is None or posterior.likeliest.finished is not None:
         return {}
-    found: dict[str, list[TaskStep]] = {}
+    found: dict[str, list[Leaf[StepMonitor]]] = {}
     for leaf in leaves(posterior.likeliest.state):
-        found.setdefault(leaf.step.stage, []).append(leaf.step)
+        found.setdefault(leaf.step.stage, []).append(leaf)
     return found
 
 

@@ -138,6 +138,17 @@ def test_a_first_stage_begins_when_all_approaching_actors_move(
     assert began is at if at is None else began == pytest.approx(at, abs=0.4)
 
 
+def test_what_another_actor_does_begins_a_first_stage_though_the_lead_of_its_trend_rests(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The giver takes the payload, which moves; the receiver, who is named first, still rests."""
+    monkeypatch.setattr(stage_beginnings, "moving_bodies", lambda mind: frozenset((ARM, SATELLITE)))
+    meets = RelationSpan("touching", 3.0, 20.0), RelationSpan("coupled", 3.5, 20.0)
+    nears = RelationSpan("converging", 8.0, 12.0, (SATELLITE, INTRUDER))
+    script = Script((*meets, nears), THREE, identities=IDENTITIES)
+    assert begun(script, OFFER)["t"] == pytest.approx(3.0, abs=0.4)
+
+
 def dated(script: Script, text: str, until: float = 14.0) -> dict[str, tuple[float, float]]:
     """Stage -> when its beginning was reported, and when it is said to have begun."""
     events = watch(script, until, text).events
