@@ -62,9 +62,7 @@ def adapt_appearance(
     back = ANCHOR * (taught.mask - appearance.mask)
     mask = (appearance.mask + rate * (seen - appearance.mask) + back).astype(np.float32)
     share = (np.float32(PIXEL_RATE) * seen)[..., None]
-    pixels = np.round(appearance.lab + share * (lab.astype(np.float32) - appearance.lab)).astype(
-        np.uint8
-    )
+    pixels = _blended(appearance.lab, lab, share)
     seen_colours = learn_colours(
         lab, seen * appearance.mask, surroundings(np.maximum(appearance.mask, seen))
     )
@@ -77,6 +75,27 @@ def adapt_appearance(
             pixels, mask, colours, appearance.filter.blended(new_filter, FILTER_RATE)
         ),
     )
+
+
+def refreshed(appearance: Appearance, lab: NDArray[np.uint8], rate: float) -> Appearance:
+    """An appearance whose pixels and filter are replaced in part by those of a frame.
+
+    Args:
+        appearance: The appearance of an object.
+        lab: (h, w, 3) uint8, Lab: its patch in the frame.
+        rate: Share of the frame, 0 to 1.
+    """
+    share = (np.float32(rate) * appearance.mask)[..., None]
+    fresh = learned_filter(lab, appearance.mask, appearance.colours)
+    return replace(
+        appearance,
+        lab=_blended(appearance.lab, lab, share),
+        filter=appearance.filter.blended(fresh, rate),
+    )
+
+
+def _blended(old: NDArray[np.uint8], new: NDArray[np.uint8], share: Floats) -> NDArray[np.uint8]:
+    return np.round(old + share * (new.astype(np.float32) - old)).astype(np.uint8)
 
 
 def relearn_appearance(

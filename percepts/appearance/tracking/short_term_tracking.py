@@ -10,15 +10,17 @@ from numpy.typing import NDArray
 
 from visup.percepts.appearance.background.point_tracking import STILL, PointMotion, similarity_of
 from visup.percepts.appearance.models.appearance_model import Appearance
+from visup.percepts.appearance.models.deformation import deformation, deformed
 from visup.percepts.appearance.models.pose import Doubles, PatchPose
 from visup.percepts.appearance.models.rest_memory import Displacement, displacement_since
 from visup.percepts.appearance.models.scene import Scene
-from visup.percepts.appearance.tracking.adaptation import PATH_S, still_px
-from visup.percepts.appearance.tracking.track import TaughtObjectTrack, TrackState
+from visup.percepts.appearance.tracking.adaptation import PATH_S, refreshed, still_px
+from visup.percepts.appearance.tracking.track import IN_VIEW, TaughtObjectTrack, TrackState
 from visup.percepts.appearance.tracking.verification import (
     colour_agreement,
     explained_pixels,
     filter_peak,
+    mean_difference,
     template_of,
     verify,
 )
@@ -38,6 +40,8 @@ MOVE_MARGIN = 0.04  # otherwise: share of pixels by which the move must explain 
 COVERED_SHARE = 0.2  # unchanged share below which an object at rest is covered
 UNCOVERED_SHARE = 0.5  # unchanged share above which a hidden object is seen at rest again
 REDETECTION_SCORE = 0.6  # match score above which a hidden object is seen again, not at rest
+BENT_SHARE = 0.6  # share of its pixels that a deformation must explain to locate an object
+BENT_RATE = 0.3  # share of the frame in an appearance that has just been deformed
 STEADY_PEAK_SHARE = 0.8
 """Share of the last peak from which agreeing points need no scale and rotation search."""
 REFINEMENT_INTERVAL = 4  # frames between two such searches in any case
@@ -86,7 +90,8 @@ def track_object(track: TaughtObjectTrack, owner: int, motion: FrameMotion) -> T
         return _redetect_hidden(track, motion)
     if track.state is TrackState.RESTING and motion.static and track.rest is not None:
         return _track_at_rest(track, motion.points.of(owner), motion)
-    return _track_moving(track, motion.points.of(owner), motion)
+    points = motion.points.of(owner)
+    return _deformed(track, _track_moving(track, points, motion), points, motion)
 
 
 def displacements(tracks: Iterable[TaughtObjectTrack], scene: Scene) -> dict[str, Displacement]:
@@ -170,6 +175,59 @@ def _track_moving(
     return replace(
         track, state=TrackState.MOVING, pose=guess, peak=peak, explained_share=share, rest=None
     )
+
+
+def _deformed(
+    old: TaughtObjectTrack, rigid: TaughtObjectTrack, points: Points, motion: FrameMotion
+) -> TaughtObjectTrack:
+    """The track with an appearance that is deformed as its points moved, if that explains the frame better.
+
+    Args:
+        old: The previous track.
+        rigid: The track in this frame with the appearance as it was.
+        points: Points of the object.
+        motion: The frame's motion.
+    """
+    scene = motion.scene
+    if old.state not in IN_VIEW:
+        return rigid
+    assert old.pose is not None
+    assert old.appearance is not None
+    similar = _pose_from_points(old.pose, points)[0]
+    if similar is None or deformation(old.appearance.shape, old.pose, similar, points) is None:
+        return rigid
+    pose = _with_former_size(similar, old.pose, points, motion)
+    bend = deformation(old.appearance.shape, old.pose, pose, points)
+    if bend is None:
+        return rigid
+    bent = deformed(old.appearance, bend)
+    patch = scene.patch(pose, bent.shape)
+    _, share = explained_pixels(template_of(bent.lab, bent.mask), patch)
+    if rigid.last_seen == scene.time:
+        assert rigid.pose is not None
+        there = mean_difference(old.appearance, scene.patch(rigid.pose, bent.shape))
+        better = mean_difference(bent, patch) <= there
+    else:
+        better = share >= BENT_SHARE
+    if not better:
+        return rigid
+    bent = refreshed(bent, patch, BENT_RATE)
+    now = replace(old, appearance=bent, colour_excess=rigid.colour_excess)
+    return _observed_moving(now, pose, rigid.peak, share, scene)
+
+
+def _with_former_size(
+    pose: PatchPose, old: PatchPose, points: Points, motion: FrameMotion
+) -> PatchPose:
+    """A pose estimated from points, with a scale that changes with the camera only.
+
+    The points of an arm that folds come closer together, but the arm does not become smaller.
+    """
+    pose = replace(pose, scale=old.moved(motion.camera).scale)
+    carried = old.motion_to(pose)
+    before, after = points
+    left = np.median(after - before @ carried[:, :2].T - carried[:, 2], axis=0)
+    return replace(pose, x=pose.x + float(left[0]), y=pose.y + float(left[1]))
 
 
 def _observed_moving(

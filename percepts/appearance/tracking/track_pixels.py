@@ -1,9 +1,10 @@
-"""Pixels of the objects in view."""
+"""Pixels of the objects in view, and points on them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +12,11 @@ from visup.percepts.appearance.models.blob import Blob
 from visup.percepts.appearance.models.scene import Scene
 from visup.percepts.appearance.tracking.redetection import footprint
 from visup.percepts.appearance.tracking.track import IN_VIEW, TaughtObjectTrack
+
+POINTS = 48  # most points tracked on each object
+MIN_SPACING_PX = 3.0  # least distance of two of them, working pixels
+MIN_SPACING = 0.05  # the same, as a share of the root of the object's area
+MIN_QUALITY = 0.01  # least strength of a corner, as a share of the object's strongest
 
 
 def visible_pixels(tracks: Sequence[TaughtObjectTrack], scene: Scene) -> dict[str, Blob]:
@@ -37,3 +43,15 @@ def occupied_blobs(track: TaughtObjectTrack, scene: Scene) -> Iterator[Blob]:
         covered = footprint(scene, track.pose, track.appearance)
         if covered is not None:
             yield covered
+
+
+def points_on(scene: Scene, blob: Blob) -> NDArray[np.float32]:
+    """(N, 2) float32: trackable points of an object, spread over it."""
+    left, top, right, bottom = blob.window
+    inner = cv2.erode(blob.mask.view(np.uint8), np.ones((3, 3), np.uint8))
+    grey = np.ascontiguousarray(scene.grey[top:bottom, left:right])
+    spacing = max(MIN_SPACING_PX, MIN_SPACING * float(np.sqrt(blob.area)))
+    found = cv2.goodFeaturesToTrack(grey, POINTS, MIN_QUALITY, spacing, mask=inner)
+    if found is None:
+        return np.zeros((0, 2), dtype=np.float32)
+    return np.asarray(found.reshape(-1, 2) + np.array([left, top]), dtype=np.float32)

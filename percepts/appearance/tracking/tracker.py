@@ -6,7 +6,6 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -60,12 +59,12 @@ from visup.percepts.appearance.tracking.track import IN_VIEW, TaughtObjectTrack,
 from visup.percepts.appearance.tracking.track_pixels import (
     object_mask,
     occupied_blobs,
+    points_on,
     visible_pixels,
 )
 
 Mask = NDArray[np.bool_]
 
-POINTS = 24  # most points tracked on each object
 HOLD_S = 0.12  # how long a lost object is still reported at its predicted position
 MIN_VISIBLE_SHARE = 0.04  # visible share below which an object is hidden
 SEARCH_INTERVAL = 3  # frames between two searches of the whole image
@@ -189,7 +188,7 @@ class TaughtObjectTracker:
         for k, t in enumerate(self.tracks):
             rests = t.state is TrackState.RESTING and t.key in calm
             if t.visible is not None and not rests:
-                points.append((k, _points_on(old, t.visible)))
+                points.append((k, points_on(old, t.visible)))
         owner = np.concatenate([np.full(len(p), k) for k, p in points]).astype(np.int64)
         return track_points(old, scene, np.concatenate([p for _, p in points]), owner)
 
@@ -384,14 +383,3 @@ def _claim(track: TaughtObjectTrack, scene: Scene, same: Mapping[str, Mask]) -> 
     assert track.pose is not None
     assert track.appearance is not None
     return appearance_log_odds(scene, track.pose, track.appearance)
-
-
-def _points_on(scene: Scene, blob: Blob) -> NDArray[np.float32]:
-    """(N, 2) float32: trackable points of an object."""
-    left, top, right, bottom = blob.window
-    inner = cv2.erode(blob.mask.view(np.uint8), np.ones((3, 3), np.uint8))
-    grey = np.ascontiguousarray(scene.grey[top:bottom, left:right])
-    found = cv2.goodFeaturesToTrack(grey, POINTS, 0.02, 3, mask=inner)
-    if found is None:
-        return np.zeros((0, 2), dtype=np.float32)
-    return np.asarray(found.reshape(-1, 2) + np.array([left, top]), dtype=np.float32)

@@ -19,6 +19,7 @@ Floats = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
 
 _NEAR = np.array([16, 9, 9], dtype=np.int16)  # tolerance of a matching pixel, steps of Lab
+_MAX_DIFFERENCE = np.float32(60.0)  # most that a pixel counts in a mean difference, steps of Lab
 _LIGHTER = 30.0  # most overall change of lightness, steps
 _BLOCK = np.ones((3, 3), np.uint8)
 
@@ -101,6 +102,13 @@ def explained_pixels(template: Template, lab: Bytes) -> tuple[NDArray[np.bool_],
     )
     weight = float(template.weight.sum())
     return matches, float((template.weight * matches).sum()) / max(weight, 1e-6)
+
+
+def mean_difference(appearance: Appearance, lab: Bytes) -> float:
+    """Mean difference of an object's pixels from a patch, steps of Lab; large ones are capped."""
+    off = cv2.absdiff(appearance.lab, lab).sum(axis=2, dtype=np.float32)
+    weighted = np.minimum(off, _MAX_DIFFERENCE) * appearance.mask
+    return float(weighted.sum() / max(appearance.area, 1e-6))
 
 
 def colour_agreement(
