@@ -16,6 +16,7 @@ from visup.percepts.appearance.models.rest_memory import Displacement, displacem
 from visup.percepts.appearance.models.scene import Scene
 from visup.percepts.appearance.tracking.adaptation import PATH_S, refreshed, still_px
 from visup.percepts.appearance.tracking.track import IN_VIEW, TaughtObjectTrack, TrackState
+from visup.percepts.appearance.tracking.track_pixels import Points, points_of_own_colour
 from visup.percepts.appearance.tracking.verification import (
     colour_agreement,
     explained_pixels,
@@ -24,8 +25,6 @@ from visup.percepts.appearance.tracking.verification import (
     template_of,
     verify,
 )
-
-Points = tuple[NDArray[np.float32], NDArray[np.float32]]
 
 UNCHANGED_SHARE = 0.97  # unchanged share of an object's window from which the object has not moved
 LOSE_S = 0.5  # how long an object is tracked without being observed
@@ -41,6 +40,8 @@ COVERED_SHARE = 0.2  # unchanged share below which an object at rest is covered
 UNCOVERED_SHARE = 0.5  # unchanged share above which a hidden object is seen at rest again
 REDETECTION_SCORE = 0.6  # match score above which a hidden object is seen again, not at rest
 BENT_SHARE = 0.6  # share of its pixels that a deformation must explain to locate an object
+LESS_DIFFERENCE = 0.03  # share by which it must differ less from the frame than what is rigid does
+COLOUR_MARGIN = 0.05  # most colour excess that it may cost: it would stretch over the background
 BENT_RATE = 0.3  # share of the frame in an appearance that has just been deformed
 STEADY_PEAK_SHARE = 0.8
 """Share of the last peak from which agreeing points need no scale and rotation search."""
@@ -188,32 +189,38 @@ def _deformed(
         points: Points of the object.
         motion: The frame's motion.
     """
-    scene = motion.scene
-    if old.state not in IN_VIEW:
+    scene, pose, appearance = motion.scene, old.pose, old.appearance
+    if old.state not in IN_VIEW or pose is None or appearance is None:
         return rigid
-    assert old.pose is not None
-    assert old.appearance is not None
-    similar = _pose_from_points(old.pose, points)[0]
-    if similar is None or deformation(old.appearance.shape, old.pose, similar, points) is None:
+    points = points_of_own_colour(scene, points, appearance.colours)
+    found = _bent(appearance, pose, points, motion)
+    if found is None:
         return rigid
-    pose = _with_former_size(similar, old.pose, points, motion)
-    bend = deformation(old.appearance.shape, old.pose, pose, points)
-    if bend is None:
-        return rigid
-    bent = deformed(old.appearance, bend)
+    pose, bent = found
     patch = scene.patch(pose, bent.shape)
     _, share = explained_pixels(template_of(bent.lab, bent.mask), patch)
-    if rigid.last_seen == scene.time:
-        assert rigid.pose is not None
-        there = mean_difference(old.appearance, scene.patch(rigid.pose, bent.shape))
-        better = mean_difference(bent, patch) <= there
+    colours, _ = colour_agreement(scene, pose, bent)
+    if rigid.last_seen == scene.time and rigid.pose is not None:
+        there = mean_difference(appearance, scene.patch(rigid.pose, bent.shape))
+        better = mean_difference(bent, patch) <= (1 - LESS_DIFFERENCE) * there
     else:
         better = share >= BENT_SHARE
-    if not better:
+    if not better or colours < rigid.colour_excess - COLOUR_MARGIN:
         return rigid
-    bent = refreshed(bent, patch, BENT_RATE)
-    now = replace(old, appearance=bent, colour_excess=rigid.colour_excess)
+    now = replace(old, appearance=refreshed(bent, patch, BENT_RATE), colour_excess=colours)
     return _observed_moving(now, pose, rigid.peak, share, scene)
+
+
+def _bent(
+    appearance: Appearance, pose: PatchPose, points: Points, motion: FrameMotion
+) -> tuple[PatchPose, Appearance] | None:
+    """The new pose and the deformed appearance; None if the points fit a similarity or are too few."""
+    similar = _pose_from_points(pose, points)[0]
+    if similar is None or deformation(appearance.shape, pose, similar, points) is None:
+        return None
+    new = _with_former_size(similar, pose, points, motion)
+    bend = deformation(appearance.shape, pose, new, points)
+    return None if bend is None else (new, deformed(appearance, bend))
 
 
 def _with_former_size(

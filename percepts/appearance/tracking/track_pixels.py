@@ -9,13 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.percepts.appearance.models.blob import Blob
+from visup.percepts.appearance.models.colours import ColourModel, colour_bins
 from visup.percepts.appearance.models.scene import Scene
 from visup.percepts.appearance.tracking.redetection import footprint
 from visup.percepts.appearance.tracking.track import IN_VIEW, TaughtObjectTrack
 
+Points = tuple[NDArray[np.float32], NDArray[np.float32]]
+
 POINTS = 48  # most points tracked on each object
 MIN_SPACING_PX = 3.0  # least distance of two of them, working pixels
 MIN_SPACING = 0.05  # the same, as a share of the root of the object's area
+_REACH = 2  # pixels around a point whose colours are looked at, in each direction
+_AROUND = np.indices((2 * _REACH + 1, 2 * _REACH + 1)).reshape(2, -1).T - _REACH
 MIN_QUALITY = 0.01  # least strength of a corner, as a share of the object's strongest
 
 
@@ -55,3 +60,21 @@ def points_on(scene: Scene, blob: Blob) -> NDArray[np.float32]:
     if found is None:
         return np.zeros((0, 2), dtype=np.float32)
     return np.asarray(found.reshape(-1, 2) + np.array([left, top]), dtype=np.float32)
+
+
+def points_of_own_colour(scene: Scene, points: Points, colours: ColourModel) -> Points:
+    """The points around which an object's colours outweigh those of its surroundings.
+
+    Others may be on the background, which a mask that is a little too large shows.
+
+    Args:
+        scene: The frame.
+        points: (N, 2) float32, points of the object in the previous frame and in this one, working pixels.
+        colours: Its colours.
+    """
+    before, after = points
+    at = np.round(after).astype(np.int64)[:, None] + _AROUND
+    at = np.clip(at, 0, np.array(scene.size) - 1)
+    odds = colours.odds(colour_bins(scene.lab[0][at[..., 1], at[..., 0]]))
+    own = odds.mean(axis=1) > 0
+    return before[own], after[own]
