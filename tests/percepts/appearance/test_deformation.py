@@ -15,6 +15,8 @@ from visup.percepts.appearance.models.deformation import MIN_POINTS, deformation
 from visup.percepts.appearance.models.pose import PatchPose
 from visup.percepts.appearance.models.scene import prepare_scene
 from visup.percepts.appearance.tracking import short_term_tracking
+from visup.percepts.appearance.tracking.adaptation import refreshed
+from visup.percepts.appearance.tracking.track_pixels import points_of_own_colour
 from visup.percepts.appearance.tracking.tracker import TaughtObjectTracker
 from visup.percepts.taught.taught_view import taught_view_from_mask
 
@@ -108,6 +110,30 @@ def test_one_point_on_something_else_changes_nothing(which: int, far: float) -> 
     after = points.copy()
     after[which] += np.float32(far)
     assert deformation(SHAPE, POSE, POSE, (points, after)) is None
+
+
+def test_points_on_the_background_are_not_the_objects() -> None:
+    image, mask = arm(0.0)
+    scene = prepare_scene(image, 0.0)
+    way = np.array([np.cos(-1.2), np.sin(-1.2)])
+    on_arm = np.array([SHOULDER + far * way for far in (15, 35, 55)], dtype=np.float32)
+    off_arm = np.array([(20, 20), (200, 150)], dtype=np.float32)
+    assert all(mask[int(y), int(x)] for x, y in on_arm)
+    after = np.concatenate([on_arm, off_arm])
+    before = after - np.float32(2)
+    kept = points_of_own_colour(scene, (before, after), MODEL.colours)
+    np.testing.assert_array_equal(kept[0], before[: len(on_arm)])
+    np.testing.assert_array_equal(kept[1], on_arm)
+
+
+@given(st.floats(0, 1))
+def test_an_appearance_is_refreshed_within_its_mask_by_a_share_of_the_frame(rate: float) -> None:
+    frame = np.full_like(MODEL.lab, 100)
+    fresh = refreshed(MODEL, frame, rate)
+    inside, outside = MODEL.mask > 0.99, MODEL.mask == 0
+    wanted = MODEL.lab + rate * (100.0 - MODEL.lab)
+    np.testing.assert_allclose(fresh.lab[inside], wanted[inside], atol=2)
+    np.testing.assert_array_equal(fresh.lab[outside], MODEL.lab[outside])
 
 
 def iou(tracker: TaughtObjectTracker, mask: Mask) -> float:
