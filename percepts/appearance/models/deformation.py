@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from visup.percepts.appearance.models.appearance_model import Appearance
-from visup.percepts.appearance.models.pose import PatchPose
+from visup.percepts.appearance.models.pose import Doubles, PatchPose
 
 Floats = NDArray[np.float32]
 
@@ -66,6 +66,29 @@ def deformed(appearance: Appearance, motion: Floats) -> Appearance:
     return replace(
         appearance, mask=np.asarray(mask, dtype=np.float32), lab=np.asarray(lab, dtype=np.uint8)
     )
+
+
+def with_former_size(
+    pose: PatchPose, old: PatchPose, points: tuple[Floats, Floats], camera: Doubles
+) -> PatchPose:
+    """A pose estimated from points, with a scale that changes with the camera only.
+
+    The points of an arm that folds come closer together, but the arm does not become smaller.
+
+    Args:
+        pose: The estimated pose.
+        old: The pose in the previous frame.
+        points: (N, 2) float32, points in the previous and in this frame, working pixels.
+        camera: (2, 3) similarity of the image since then.
+
+    Returns:
+        The pose with that scale, shifted so that the points on either side of it balance (by the median).
+    """
+    pose = replace(pose, scale=old.moved(camera).scale)
+    carried = old.motion_to(pose)
+    before, after = points
+    left = np.median(after - before @ carried[:, :2].T - carried[:, 2], axis=0)
+    return replace(pose, x=pose.x + float(left[0]), y=pose.y + float(left[1]))
 
 
 def _in_patch(points: Floats, pose: PatchPose, shape: tuple[int, int]) -> Floats:

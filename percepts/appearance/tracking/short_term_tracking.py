@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from visup.percepts.appearance.background.point_tracking import STILL, PointMotion, similarity_of
 from visup.percepts.appearance.models.appearance_model import Appearance
-from visup.percepts.appearance.models.deformation import deformation, deformed
+from visup.percepts.appearance.models.deformation import deformation, deformed, with_former_size
 from visup.percepts.appearance.models.pose import Doubles, PatchPose
 from visup.percepts.appearance.models.rest_memory import Displacement, displacement_since
 from visup.percepts.appearance.models.scene import Scene
@@ -218,23 +218,9 @@ def _bent(
     similar = _pose_from_points(pose, points)[0]
     if similar is None or deformation(appearance.shape, pose, similar, points) is None:
         return None
-    new = _with_former_size(similar, pose, points, motion)
+    new = with_former_size(similar, pose, points, motion.camera)
     bend = deformation(appearance.shape, pose, new, points)
     return None if bend is None else (new, deformed(appearance, bend))
-
-
-def _with_former_size(
-    pose: PatchPose, old: PatchPose, points: Points, motion: FrameMotion
-) -> PatchPose:
-    """A pose estimated from points, with a scale that changes with the camera only.
-
-    The points of an arm that folds come closer together, but the arm does not become smaller.
-    """
-    pose = replace(pose, scale=old.moved(motion.camera).scale)
-    carried = old.motion_to(pose)
-    before, after = points
-    left = np.median(after - before @ carried[:, :2].T - carried[:, 2], axis=0)
-    return replace(pose, x=pose.x + float(left[0]), y=pose.y + float(left[1]))
 
 
 def _observed_moving(

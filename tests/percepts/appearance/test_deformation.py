@@ -11,7 +11,12 @@ from numpy.typing import NDArray
 
 from tests.percepts.appearance.scenes import HEIGHT, WIDTH, table
 from visup.percepts.appearance.models.appearance_model import Appearance, view_models
-from visup.percepts.appearance.models.deformation import MIN_POINTS, deformation, deformed
+from visup.percepts.appearance.models.deformation import (
+    MIN_POINTS,
+    deformation,
+    deformed,
+    with_former_size,
+)
 from visup.percepts.appearance.models.pose import PatchPose
 from visup.percepts.appearance.models.scene import prepare_scene
 from visup.percepts.appearance.tracking import short_term_tracking
@@ -107,9 +112,25 @@ def test_points_that_all_shift_alike_shift_mask_and_pixels(
 @given(st.integers(0, len(grid()) - 1), st.floats(3, 40))
 def test_one_point_on_something_else_changes_nothing(which: int, far: float) -> None:
     points = grid()
-    after = points.copy()
+    after = points + np.float32(2)
+    clean = deformation(SHAPE, POSE, POSE, (points, after))
     after[which] += np.float32(far)
-    assert deformation(SHAPE, POSE, POSE, (points, after)) is None
+    motion = deformation(SHAPE, POSE, POSE, (points, after))
+    assert clean is not None
+    assert motion is not None
+    np.testing.assert_allclose(motion, clean, atol=0.01)
+
+
+@given(poses, st.floats(0.9, 1.1))
+def test_a_pose_keeps_the_size_that_the_camera_gives_it(folded: PatchPose, zoom: float) -> None:
+    points = grid()
+    camera = np.array([[zoom, 0, 3], [0, zoom, -2]])
+    after = moved(points, POSE, folded)
+    kept = with_former_size(folded, POSE, (points, after), camera)
+    assert kept.scale == pytest.approx(POSE.scale * zoom)
+    assert kept.angle == folded.angle
+    off = after - moved(points, POSE, kept)
+    np.testing.assert_allclose(np.median(off, axis=0), 0, atol=0.01)
 
 
 def test_points_on_the_background_are_not_the_objects() -> None:
