@@ -19,9 +19,9 @@ Points = tuple[NDArray[np.float32], NDArray[np.float32]]
 POINTS = 48  # most points tracked on each object
 MIN_SPACING_PX = 3.0  # least distance of two of them, working pixels
 MIN_SPACING = 0.05  # the same, as a share of the root of the object's area
+MIN_QUALITY = 0.01  # least strength of a corner, as a share of the object's strongest
 _REACH = 2  # pixels around a point whose colours are looked at, in each direction
 _AROUND = np.indices((2 * _REACH + 1, 2 * _REACH + 1)).reshape(2, -1).T - _REACH
-MIN_QUALITY = 0.01  # least strength of a corner, as a share of the object's strongest
 
 
 def visible_pixels(tracks: Sequence[TaughtObjectTrack], scene: Scene) -> dict[str, Blob]:
