@@ -19,6 +19,7 @@ from visup.percepts.appearance.models.appearance_model import Appearance
 from visup.percepts.appearance.models.pose import Doubles, PatchPose
 
 Floats = NDArray[np.float32]
+Points = tuple[Floats, Floats]
 
 MIN_POINTS = 8  # fewest points that tell a deformation
 MIN_BEND = 0.3  # least deformation worth a warp, patch pixels
@@ -28,20 +29,20 @@ _STEP = 4  # patch pixels from one interpolated value to the next
 _SOFTENING = np.float32(2.0)  # distance below which a point hardly weighs more, patch pixels
 
 
-def deformation(
-    shape: tuple[int, int], before: PatchPose, after: PatchPose, points: tuple[Floats, Floats]
-) -> Floats | None:
-    """How the pixels of a patch move beyond the motion of its pose.
+def point_deformations(
+    shape: tuple[int, int], before: PatchPose, after: PatchPose, points: Points
+) -> Points | None:
+    """What an object's points moved beyond the motion of its pose.
 
     Args:
-        shape: (height, width) of the patch of an object.
-        before: The object's pose in the previous frame.
+        shape: (height, width) of the object's patch.
+        before: Its pose in the previous frame.
         after: Its pose in this frame.
         points: (N, 2) float32, its points in the previous and in this frame, working pixels.
 
     Returns:
-        (height, width, 2) float32, (dx, dy) of what is now at each pixel, patch pixels; None when too few
-        points agree with their neighbours, or they move as the pose does.
+        (M, 2) float32 twice, patch pixels: where points are now, and (dx, dy) that they moved beyond the
+        pose; None when too few points agree with their neighbours, or they move as the pose does.
     """
     if len(points[0]) < MIN_POINTS:
         return None
@@ -54,7 +55,18 @@ def deformation(
     at, bend = at[agree], bend[agree]
     if np.quantile(np.linalg.norm(bend, axis=1), 0.8) < MIN_BEND:
         return None
-    return _interpolated(at + bend, bend, shape)
+    return at + bend, bend
+
+
+def deformation(
+    shape: tuple[int, int], before: PatchPose, after: PatchPose, points: Points
+) -> Floats | None:
+    """(h, w, 2) float32, (dx, dy): motion of what is now at each pixel beyond its pose, patch pixels.
+
+    Arguments as for `point_deformations`; None in the same cases.
+    """
+    found = point_deformations(shape, before, after, points)
+    return None if found is None else _interpolated(*found, shape)
 
 
 def deformed(appearance: Appearance, motion: Floats) -> Appearance:
@@ -68,9 +80,7 @@ def deformed(appearance: Appearance, motion: Floats) -> Appearance:
     )
 
 
-def with_former_size(
-    pose: PatchPose, old: PatchPose, points: tuple[Floats, Floats], camera: Doubles
-) -> PatchPose:
+def with_former_size(pose: PatchPose, old: PatchPose, points: Points, camera: Doubles) -> PatchPose:
     """A pose estimated from points, with a scale that changes with the camera only.
 
     The points of an arm that folds come closer together, but the arm does not become smaller.

@@ -10,13 +10,19 @@ from numpy.typing import NDArray
 
 from visup.percepts.appearance.background.point_tracking import STILL, PointMotion, similarity_of
 from visup.percepts.appearance.models.appearance_model import Appearance
-from visup.percepts.appearance.models.deformation import deformation, deformed, with_former_size
+from visup.percepts.appearance.models.deformation import (
+    Points,
+    deformation,
+    deformed,
+    point_deformations,
+    with_former_size,
+)
 from visup.percepts.appearance.models.pose import Doubles, PatchPose
 from visup.percepts.appearance.models.rest_memory import Displacement, displacement_since
 from visup.percepts.appearance.models.scene import Scene
 from visup.percepts.appearance.tracking.adaptation import PATH_S, refreshed, still_px
 from visup.percepts.appearance.tracking.track import IN_VIEW, TaughtObjectTrack, TrackState
-from visup.percepts.appearance.tracking.track_pixels import Points, points_of_own_colour
+from visup.percepts.appearance.tracking.track_pixels import points_of_own_colour
 from visup.percepts.appearance.tracking.verification import (
     colour_agreement,
     explained_pixels,
@@ -216,7 +222,7 @@ def _bent(
 ) -> tuple[PatchPose, Appearance] | None:
     """The new pose and the deformed appearance; None if the points fit a similarity or are too few."""
     similar = _pose_from_points(pose, points)[0]
-    if similar is None or deformation(appearance.shape, pose, similar, points) is None:
+    if similar is None or point_deformations(appearance.shape, pose, similar, points) is None:
         return None
     new = with_former_size(similar, pose, points, motion.camera)
     bend = deformation(appearance.shape, pose, new, points)

@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from visup.percepts.appearance.models.blob import Blob
 from visup.percepts.appearance.models.colours import ColourModel, colour_bins
+from visup.percepts.appearance.models.deformation import Points
 from visup.percepts.appearance.models.scene import Scene
 from visup.percepts.appearance.tracking.redetection import footprint
 from visup.percepts.appearance.tracking.track import IN_VIEW, TaughtObjectTrack
-
-Points = tuple[NDArray[np.float32], NDArray[np.float32]]
 
 POINTS = 48  # most points tracked on each object
 MIN_SPACING_PX = 3.0  # least distance of two of them, working pixels

@@ -168,14 +168,23 @@ def iou(tracker: TaughtObjectTracker, mask: Mask) -> float:
     return float(np.count_nonzero(seen & mask) / np.count_nonzero(seen | mask))
 
 
+def tracker_of_arm() -> TaughtObjectTracker:
+    image, mask = arm(0.0)
+    return TaughtObjectTracker(view_models([taught_view_from_mask("arm", image, mask)]))
+
+
+def step(tracker: TaughtObjectTracker, number: int) -> Mask:
+    """Track the arm in one of the frames in which it bends; its mask there."""
+    image, mask = arm(BEND * number / (FRAMES - 1))
+    tracker.step(prepare_scene(image, number / 15), lambda _: 1)
+    return mask
+
+
 def followed() -> float:
     """Overlap at the end of an arm that was followed while its elbow bent."""
-    image, mask = arm(0.0)
-    tracker = TaughtObjectTracker(view_models([taught_view_from_mask("arm", image, mask)]))
-    for k in range(FRAMES):
-        image, mask = arm(BEND * k / (FRAMES - 1))
-        tracker.step(prepare_scene(image, k / 15), lambda _: 1)
-    return iou(tracker, mask)
+    tracker = tracker_of_arm()
+    masks = [step(tracker, k) for k in range(FRAMES)]
+    return iou(tracker, masks[-1])
 
 
 def test_an_arm_that_bends_is_followed() -> None:
@@ -185,3 +194,37 @@ def test_an_arm_that_bends_is_followed() -> None:
 def test_without_deformation_it_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(short_term_tracking, "deformation", lambda *_: None)
     assert followed() < 0.6
+
+
+def shifts_all(shape: tuple[int, int], *_: object) -> Floats:
+    """A wrong deformation: the whole object is said to be elsewhere."""
+    return np.full((*shape, 2), 8, dtype=np.float32)
+
+
+@pytest.mark.parametrize("differs", [True, False])
+def test_a_wrong_deformation_is_not_taken(monkeypatch: pytest.MonkeyPatch, differs: bool) -> None:
+    """It differs more from the frame; and if it did not, its colours would be those of the table."""
+    if differs:
+        monkeypatch.setattr(short_term_tracking, "COLOUR_MARGIN", 2.0)  # more than colours can cost
+    else:
+        monkeypatch.setattr(short_term_tracking, "mean_difference", lambda *_: 0.0)
+    monkeypatch.setattr(short_term_tracking, "deformation", lambda *_: None)
+    rigid = followed()
+    monkeypatch.setattr(short_term_tracking, "deformation", shifts_all)
+    assert followed() == rigid
+
+
+@pytest.mark.parametrize("right", [True, False])
+def test_an_arm_that_nothing_else_locates_is_seen_where_its_points_bend_it(
+    monkeypatch: pytest.MonkeyPatch, right: bool
+) -> None:
+    """Unless what the bent arm should look like is not there."""
+    tracker, last = tracker_of_arm(), 8
+    for k in range(last):
+        step(tracker, k)
+    monkeypatch.setattr(short_term_tracking, "_track_moving", lambda track, *_: track)
+    monkeypatch.setattr(short_term_tracking, "colour_agreement", lambda _, pose, __: (1.0, pose))
+    if not right:
+        monkeypatch.setattr(short_term_tracking, "deformation", shifts_all)
+    step(tracker, last)
+    assert (tracker.tracks[0].last_seen == last / 15) is right
