@@ -138,7 +138,7 @@ def task_vocabulary(task: Task, actions: Mapping[str, ActionDefinition]) -> Task
             zone = next(str(a) for a in fact.arguments if a in zones)
             evaluators[key] = _zone_evaluator(task, name, zone)
             text = f"{text} {zone}"
-        meaning = _draws_near(actions[name]) if _asks_for_nearness(fact) else actions[name]
+        meaning = _with_trend(actions[name], fact)
         takes = tuple(k for k in meaning.kinds if k == "object")
         meanings[key] = replace(
             meaning, name=key, holds=(key,), arity=len(takes), takes=takes, text=text
@@ -161,17 +161,13 @@ def _compared(fact: Comparison, name: str, amounts: Sequence[Number]) -> str:
     return f"at a {name.replace('_', ' ')} {SIGNS[fact.operator]} {said}"
 
 
-def _asks_for_nearness(fact: Fact) -> bool:
-    return (
-        isinstance(fact, Comparison)
-        and action_of(fact).name in NEARNESS
-        and fact.operator in ("<", "<=", BETWEEN)
-    )
-
-
-def _draws_near(action: ActionDefinition) -> ActionDefinition:
-    """An action that requires nearness also expects approaching."""
-    return replace(action, expects=("converging",))
+def _with_trend(action: ActionDefinition, fact: Fact) -> ActionDefinition:
+    """What requires nearness expects approaching, and fails if they draw apart; the reverse for distance."""
+    if not isinstance(fact, Comparison) or action.name not in NEARNESS:
+        return action
+    near = fact.operator in ("<", "<=", BETWEEN)
+    expected, contrary = ("converging", "diverging") if near else ("diverging", "converging")
+    return replace(action, expects=(expected,), contrary=(contrary,))
 
 
 def _again(

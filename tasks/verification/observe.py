@@ -283,7 +283,8 @@ def observe(
     if contrary is None and meaning.name == "moving_together":
         contrary = came_apart(relations.mind, ids)
     unreached = relations.unreached(meaning.name, ids, contrary)
-    if contrary is not None and relations.explains_away(contrary, meaning.name, ids):
+    within = meaning.measures and holds is not Truth.FALSE
+    if contrary is not None and (within or relations.explains_away(contrary, meaning.name, ids)):
         contrary = None
     entry, new_trend = relations.begun(meaning.begins, ids)
     by_contact = not set(CONTACTS).isdisjoint(meaning.begins)

@@ -42,6 +42,34 @@ def test_staying_in_a_range_succeeds_and_leaving_it_fails(
     assert finish(watch_gaps(gaps, task).last.tasks[0]) is verdict
 
 
+WITHIN = "<stay> ::= gap(arm, satellite) < 100 px for 10 s"
+FAR = "<away> ::= gap(arm, satellite) > 100 px for 10 s"
+
+
+@pytest.mark.parametrize(
+    ("task", "gaps", "failing_at"),
+    [
+        (
+            WITHIN,
+            lambda t: 60.0 + 30 * max(0.0, t - 6.0),
+            8.6,
+        ),  # beyond it from 7.3 s, drawing apart from 8 s
+        (WITHIN, lambda t: 60.0 + 30 * max(0.0, t - 9.0), 10.9),  # drawing apart before, within it
+        (WITHIN, lambda t: 60.0 + 3 * max(0.0, t - 8.0), None),  # it is near for long enough
+        (WITHIN, lambda t: 60.0 if not 8.2 < t < 8.5 else 101.0, None),
+        (WITHIN, lambda t: 60.0 if t < 9.0 else nan, None),  # what is not seen breaks nothing
+        (FAR, lambda t: 200.0, None),
+        (FAR, lambda t: 200.0 - 120 * max(0.0, min(t - 1.0, 2.0)), 2.5),
+    ],
+)
+def test_who_leaves_a_range_before_the_time_fails(
+    task: str, gaps: Callable[[float], float], failing_at: float | None
+) -> None:
+    played = watch_gaps(gaps, task, 14.0)
+    failing = [e.time for e in played.events if e.kind == "stage_failing"]
+    assert failing == ([] if failing_at is None else [pytest.approx(failing_at, abs=0.7)])
+
+
 def test_oscillation_within_the_range_is_accepted() -> None:
     played = play(
         task_reasoner([parse_task(TASK)]),
