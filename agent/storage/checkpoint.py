@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from visup.agent.model.errors import OutputError
 
-MAGIC = b"VISUPST9"
+MAGIC = b"VISUPSTA"
 PACKAGE = "visup."
 _HEAD = struct.Struct(
     "<8sQII"

@@ -8,13 +8,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from visup.percepts.appearance.models.pose import Doubles
+from visup.percepts.appearance.models.pose import Bytes, Doubles
 from visup.percepts.appearance.models.scene import Scene
 
 STILL = np.eye(2, 3)
 NO_POINTS = np.zeros((0, 2), dtype=np.float32)
 _GRID = 12, 8  # grid of the image; one camera point per cell
-_WINDOW = (13, 13)
+WINDOW_PX = 13
+"""Side of the window of a tracked point, pixels."""
 _BACK = 0.7  # most forward-backward error, pixels
 
 
@@ -51,23 +52,45 @@ def track_points(
     """
     if not len(points):
         return PointMotion(points, points, owner)
-    here, there = old.grey, new.grey
+    after, found = track_from(old.grey, new.grey, points, points, levels=3)
+    return PointMotion(points[found], after[found], owner[found])
+
+
+def track_from(
+    here: Bytes,
+    there: Bytes,
+    points: NDArray[np.float32],
+    guess: NDArray[np.float32],
+    *,
+    levels: int,
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Track points from one image to another.
+
+    Args:
+        here: (h, w) uint8.
+        there: (h, w) uint8.
+        points: (N, 2) float32, pixels of the first image.
+        guess: (N, 2) float32, about where they are in the second one.
+        levels: Levels of the pyramid above the image: more of them follow faster motion, but a point on a
+            plain surface then follows what moves near it.
+
+    Returns:
+        (N, 2) float32 positions in the second image; (N,) bool, whether they pass the forward-backward
+        check.
+    """
     start = points.reshape(-1, 1, 2)
+    settings = {
+        "winSize": (WINDOW_PX, WINDOW_PX),
+        "maxLevel": levels,
+        "flags": cv2.OPTFLOW_USE_INITIAL_FLOW,
+    }
     at, found, _ = cv2.calcOpticalFlowPyrLK(
-        here, there, start, start.copy(), winSize=_WINDOW, maxLevel=3
+        here, there, start, guess.reshape(-1, 1, 2).copy(), **settings
     )
-    back, back_found, _ = cv2.calcOpticalFlowPyrLK(
-        there,
-        here,
-        at,
-        start.copy(),
-        winSize=_WINDOW,
-        maxLevel=3,
-        flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
-    )
+    back, back_found, _ = cv2.calcOpticalFlowPyrLK(there, here, at, start.copy(), **settings)
     off = np.abs(back - start).reshape(-1, 2).max(axis=1)
     fine = (found.ravel() > 0) & (back_found.ravel() > 0) & (off < _BACK)
-    return PointMotion(points[fine], at.reshape(-1, 2)[fine], owner[fine])
+    return at.reshape(-1, 2), fine
 
 
 def grid_points(

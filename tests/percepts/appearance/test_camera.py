@@ -108,6 +108,42 @@ def test_waves_do_not_move_the_camera(speed: float) -> None:
     assert all(m is not None for m in moved[count // 2 :])
 
 
+def on_a_plain_floor(x: float, number: int) -> tuple[Image, NDArray[np.bool_]]:
+    """A dark cart at x on a floor of faint stripes, and its exact mask."""
+    rows = 120 + 6 * np.sin(np.arange(HEIGHT) / 5.0)
+    grey = np.repeat(rows[:, None], WIDTH, axis=1)
+    mask = np.zeros((HEIGHT, WIDTH), dtype=bool)
+    mask[60:130, round(x) : round(x) + 80] = True
+    grey[mask] = 30
+    grey = grey + np.random.default_rng(number).normal(0.0, 2.0, grey.shape)
+    image = np.repeat(np.clip(grey, 0, 255).astype(np.uint8)[..., None], 3, axis=2)
+    return image, mask
+
+
+def test_the_outline_of_an_object_does_not_move_the_camera() -> None:
+    """On a plain floor the best points are those next to the object, which move with it."""
+    track, moved = CameraTrack(), []
+    pictures = [on_a_plain_floor(20.0 + 3.0 * max(0, k - 6), k) for k in range(30)]
+    scenes = [prepare_scene(image, k / FPS) for k, (image, _) in enumerate(pictures)]
+    for (old, new), (_, mask) in zip(pairwise(scenes), pictures, strict=False):
+        track, camera = track_camera(track, old, new, mask)
+        moved.append(camera)
+    assert all(m is None or m is STILL for m in moved)
+    assert sum(m is STILL for m in moved) > 10
+
+
+def test_slow_drift_of_a_faint_scene_is_not_lost() -> None:
+    """Points are compared with the key frame: errors from frame to frame do not add up."""
+    count, track, moved = 40, CameraTrack(), []
+    faint = [128 + 0.12 * (picture((0.15 * k, 0.0), number=k) - 128.0) for k in range(count + 1)]
+    scenes = [prepare_scene(image.astype(np.uint8), k / FPS) for k, image in enumerate(faint)]
+    for old, new in pairwise(scenes):
+        track, camera = track_camera(track, old, new, None)
+        moved.append(camera)
+    x, y = total(moved)
+    assert np.hypot(x + 0.15 * count, y) < 1.6
+
+
 @given(
     st.lists(st.floats(-0.3, 0.3), min_size=4, max_size=4),
     st.tuples(st.floats(-50, 50), st.floats(-50, 50)),
