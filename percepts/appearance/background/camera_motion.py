@@ -34,10 +34,10 @@ from visup.percepts.appearance.models.scene import Scene
 KEY_S = 0.5  # lifetime of a key frame, seconds
 OFF_PX = 1.0  # tolerance of a scene point about the common motion, working pixels
 STATIC_PX = 0.35  # most motion since the key frame of a camera that rests, working pixels
-RESTING, PROVEN, MATURE, YOUNG = 0.1, 0.4, 0.5, 0.75
-"""Least shares of the evidence of all points that must agree on rest; on a motion, if they are known to move
-with the scene; otherwise, if they were followed for some time; and at once. In 40 random worlds motions with
-more were right, apart from those of waves, which lose their support with time."""
+RESTING, AGREEING, YOUNG = 0.1, 0.5, 0.75
+"""Least shares of the evidence of all points that must agree on rest; on a motion; and on a motion of points
+that are neither known to move with the scene nor were followed for some time. In 40 random worlds motions
+with more were right, apart from those of waves, which lose their support with time."""
 BETTER = 1.5  # factor by which a motion must be better supported than rest
 MATURE_S = 0.2  # age of a key frame from which points were followed for some time, seconds
 LEAST = 8  # fewest points for an estimate
@@ -90,7 +90,7 @@ def track_camera(
     due = new.time - before.key_time > KEY_S or len(before.points) < LEAST
     track = _new_key(before, old, taken) if due else before
     track = _tracked(track, new)
-    motion = _scene_motion(track, new.time - track.key_time)
+    motion = scene_motion(track, new.time - track.key_time)
     if motion is None:
         return replace(track, motion=None), None
     return replace(track, motion=motion, known=motion), _between(track.known, motion)
@@ -141,8 +141,16 @@ def _moves_with_scene(track: CameraTrack) -> NDArray[np.bool_]:
     return np.asarray(np.hypot(*off.T) < OFF_PX)
 
 
-def _scene_motion(track: CameraTrack, age_s: float) -> Doubles | None:
-    """(2, 3) similarity of the image since the key frame, which is so old; `STILL` itself at rest."""
+def scene_motion(track: CameraTrack, age_s: float) -> Doubles | None:
+    """The motion of the image since the key frame.
+
+    Args:
+        track: The points, as tracked now.
+        age_s: Time since the key frame, seconds.
+
+    Returns:
+        (2, 3) similarity, working pixels: `STILL` itself at rest, None if the points do not agree.
+    """
     proven = int(np.count_nonzero(track.confirmed)) >= LEAST
     use = track.confirmed if proven else np.ones(len(track.points), bool)
     pairs = PointPairs(
@@ -151,7 +159,7 @@ def _scene_motion(track: CameraTrack, age_s: float) -> Doubles | None:
     if len(pairs.key) < LEAST:
         return STILL
     found = likeliest_motion(pairs, BETTER)
-    least = PROVEN if proven else MATURE if age_s >= MATURE_S else YOUNG
+    least = AGREEING if proven or age_s >= MATURE_S else YOUNG
     if found.support < least * pairs.total:
         found = rest_of(pairs)
         if found.support < RESTING * pairs.total:

@@ -12,7 +12,11 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from visup.agent import CameraMotion
-from visup.percepts.appearance.background.camera_motion import CameraTrack, track_camera
+from visup.percepts.appearance.background.camera_motion import (
+    CameraTrack,
+    scene_motion,
+    track_camera,
+)
 from visup.percepts.appearance.background.point_tracking import STILL
 from visup.percepts.appearance.models.scene import prepare_scene
 
@@ -106,6 +110,79 @@ def test_waves_do_not_move_the_camera(speed: float) -> None:
     x, y = total(moved)
     assert np.hypot(x + speed * count, y) < 1.0
     assert all(m is not None for m in moved[count // 2 :])
+
+
+def test_a_slight_jerk_counts_as_rest() -> None:
+    """What is below the tracking accuracy since the key frame is noise."""
+    places = [(0.0, 0.0)] * 3 + [(0.3, 0.0)] * 8
+    assert all(m is STILL for m in track_object(places, [0.0] * len(places)))
+
+
+@pytest.mark.parametrize(
+    ("proven", "age_s", "known"), [(True, 0.07, True), (False, 0.07, False), (False, 0.3, True)]
+)
+def test_three_fifths_of_the_points_need_to_be_known(
+    proven: bool, age_s: float, known: bool
+) -> None:
+    """They count if they moved with the scene before, or were followed for some time."""
+    rng = np.random.default_rng(0)
+    key = rng.uniform(0, 200, (50, 2)).astype(np.float32)
+    now = key + np.float32((5.0, 0.0))
+    now[:20] += rng.uniform(3, 9, (20, 2)).astype(np.float32)
+    exact = np.tile(0.04 * np.eye(2), (50, 1, 1))
+    track = CameraTrack(key_points=key, points=now, covariance=exact, confirmed=np.full(50, proven))
+    found = scene_motion(track, age_s)
+    assert (found is not None) == known
+    if found is not None:
+        assert found[:, 2] == pytest.approx((5.0, 0.0), abs=0.2)
+
+
+def test_a_pan_is_known_while_an_arm_covers_much_of_the_picture() -> None:
+    """Points that moved with the scene before are believed in a new key frame."""
+    count = 46
+    places = [(1.0 * k, 0.0) for k in range(count)]
+    moved = track_object(places, [0.0] * 16 + [4.0 * k for k in range(30)])
+    assert all(m is not None for m in moved[8:])
+    x, y = total(moved)
+    assert np.hypot(x + (count - 1), y) < 2.0
+
+
+def test_a_pan_is_known_soon_beside_an_arm_that_moves_from_the_first_picture_on() -> None:
+    count = 12
+    moved = track_object(
+        [(1.0 * k, 0.0) for k in range(count)], [70 + 4.0 * k for k in range(count)]
+    )
+    assert all(m is not None for m in moved[6:])
+    x, y = total(moved)
+    assert np.hypot(x + (count - 1), y) < 1.0
+
+
+def test_a_fast_pan_is_followed_from_frame_to_frame() -> None:
+    """Half a second after its key frame a point is 60 pixels away, too far to be looked for from there."""
+    count = 24
+    x, y = total(track_object([(5.0 * k - 40, 0.0) for k in range(count)], [0.0] * count))
+    assert np.hypot(x + 5.0 * (count - 1), y) < 3.0
+
+
+def test_a_crowd_that_goes_all_ways_leaves_the_camera_unknown() -> None:
+    """Nothing rests, and nothing moves like most."""
+    crowd, track, unknown = np.random.default_rng(0), CameraTrack(), 0
+    ways = crowd.uniform(-2.5, 2.5, (4, 6, 2))
+    ways += np.sign(ways)
+    scenes = []
+    for k in range(20):
+        grey = np.zeros((HEIGHT, WIDTH), dtype=np.float32)
+        for (row, col), _ in np.ndenumerate(ways[..., 0]):
+            dx, dy = 60 + ways[row, col] * k
+            shift = np.array([[1.0, 0.0, -dx], [0.0, 1.0, -dy]])
+            tile = np.s_[45 * row : 45 * row + 45, 40 * col : 40 * col + 40]
+            grey[tile] = cv2.warpAffine(WORLD, shift, (WIDTH, HEIGHT))[tile]
+        image = np.repeat(grey.astype(np.uint8)[..., None], 3, axis=2)
+        scenes.append(prepare_scene(image, k / FPS))
+    for old, new in pairwise(scenes):
+        track, camera = track_camera(track, old, new, None)
+        unknown += camera is None
+    assert unknown > 12
 
 
 def on_a_plain_floor(x: float, number: int) -> tuple[Image, NDArray[np.bool_]]:

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from visup.percepts.appearance.background.camera_motion import BETTER
 from visup.percepts.appearance.background.motion_consensus import (
     NOISE,
     PointPairs,
@@ -19,7 +20,6 @@ from visup.percepts.appearance.background.motion_consensus import (
 from visup.percepts.appearance.background.point_tracking import STILL
 
 Doubles = NDArray[np.float64]
-BETTER = 1.5
 CORNERS = np.array([(20.0, 20.0), (460.0, 20.0), (20.0, 340.0), (460.0, 340.0)])
 
 
@@ -87,17 +87,41 @@ def test_exact_points_outvote_twice_as_many_vague_ones() -> None:
     assert off(exact.motion, similarity(0.0, 0.0, (3.0, 1.0))) < 0.5
 
 
-def test_a_point_on_an_edge_counts_across_it() -> None:
-    """Edges along x slide along themselves by any amount; two dozen of them, and corners for the rest."""
+@pytest.mark.parametrize("angle", [0.0, 0.8, 1.6, 2.4])
+def test_a_point_on_an_edge_counts_across_it(angle: float) -> None:
+    """Parallel edges slide along themselves by any amount; two dozen of them, and corners for the rest."""
     rng = np.random.default_rng(3)
     true = similarity(0.0, 0.0, (4.0, -2.0))
+    along, across = (np.cos(angle), np.sin(angle)), (-np.sin(angle), np.cos(angle))
     key = spread_points(rng, 32)
     now = moved(key, true)
-    now[:24, 0] += rng.uniform(-8, 8, 24)
-    edges = np.tile(np.diag([8.0**2, 0.05**2]), (24, 1, 1))
-    found = likeliest_motion(PointPairs(key, now, np.concatenate([edges, alike(0.1, 8)])), BETTER)
+    now[:24] += np.outer(rng.uniform(-8, 8, 24), along)
+    edges = np.tile(
+        8.0**2 * np.outer(along, along) + 0.05**2 * np.outer(across, across), (24, 1, 1)
+    )
+    pairs = PointPairs(key, now, np.concatenate([edges, alike(0.1, 8)]))
+    found = likeliest_motion(pairs, BETTER)
     assert off(found.motion, true) < 0.3
-    assert found.support > 0.0
+    assert found.support > 0.8 * pairs.total
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_many_points_are_more_exact_than_each(seed: int) -> None:
+    """To half a pixel at the border of the picture, from points that are off by one each."""
+    rng, true = np.random.default_rng(seed), similarity(0.01, 0.01, (6.0, 2.0))
+    key = spread_points(rng, 150)
+    now = moved(key, true) + rng.normal(0, 1.0, key.shape)
+    found = likeliest_motion(PointPairs(key, now, alike(1.0, 150)), BETTER)
+    assert off(found.motion, true) < 0.5
+
+
+def test_contrast_is_no_majority() -> None:
+    """Fourteen points of great contrast rest, on a sign; two dozen good ones move."""
+    key = spread_points(np.random.default_rng(8), 38)
+    now = key.copy()
+    now[14:] += (6.0, 2.0)
+    pairs = PointPairs(key, now, np.concatenate([alike(0.01, 14), alike(0.9, 24)]))
+    assert off(likeliest_motion(pairs, BETTER).motion, similarity(0.0, 0.0, (6.0, 2.0))) < 0.3
 
 
 def test_a_camera_that_turns_fast_may_depart_from_a_similarity() -> None:
