@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import cv2
 import numpy as np
@@ -79,18 +80,17 @@ def track_from(
         check.
     """
     start = points.reshape(-1, 1, 2)
-    settings = {
-        "winSize": (WINDOW_PX, WINDOW_PX),
-        "maxLevel": levels,
-        "flags": cv2.OPTFLOW_USE_INITIAL_FLOW,
-    }
-    at, found, _ = cv2.calcOpticalFlowPyrLK(
-        here, there, start, guess.reshape(-1, 1, 2).copy(), **settings
+    follow = partial(
+        cv2.calcOpticalFlowPyrLK,
+        winSize=(WINDOW_PX, WINDOW_PX),
+        maxLevel=levels,
+        flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
     )
-    back, back_found, _ = cv2.calcOpticalFlowPyrLK(there, here, at, start.copy(), **settings)
+    at, found, _ = follow(here, there, start, guess.reshape(-1, 1, 2).copy())
+    back, back_found, _ = follow(there, here, at, start.copy())
     off = np.abs(back - start).reshape(-1, 2).max(axis=1)
     fine = (found.ravel() > 0) & (back_found.ravel() > 0) & (off < _BACK)
-    return at.reshape(-1, 2), fine
+    return np.asarray(at.reshape(-1, 2), dtype=np.float32), fine
 
 
 def grid_points(

@@ -127,7 +127,7 @@ def test_three_fifths_of_the_points_need_to_be_known(
     """They count if they moved with the scene before, or were followed for some time."""
     rng = np.random.default_rng(0)
     key = rng.uniform(0, 200, (50, 2)).astype(np.float32)
-    now = key + np.float32((5.0, 0.0))
+    now = key + np.array((5.0, 0.0), dtype=np.float32)
     now[:20] += rng.uniform(3, 9, (20, 2)).astype(np.float32)
     exact = np.tile(0.04 * np.eye(2), (50, 1, 1))
     track = CameraTrack(key_points=key, points=now, covariance=exact, confirmed=np.full(50, proven))

@@ -67,7 +67,7 @@ def test_who_leaves_a_range_before_the_time_fails(
 ) -> None:
     played = watch_gaps(gaps, task, 14.0)
     failing = [e.time for e in played.events if e.kind == "stage_failing"]
-    assert failing == ([] if failing_at is None else [pytest.approx(failing_at, abs=0.7)])
+    assert failing == ([] if failing_at is None else [pytest.approx(failing_at, abs=0.3)])
 
 
 def test_oscillation_within_the_range_is_accepted() -> None:
