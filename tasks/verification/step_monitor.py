@@ -319,18 +319,14 @@ def _note_progress(
 
 
 def _note_contrary(monitor: StepMonitor, seen: ActionObservation, now: float) -> StepMonitor:
-    """Record a contrary, from its onset within this step, unless the action holds, or held and is over.
-
-    It counts from when the action last held: bodies that draw apart within a range have not left it yet.
-    """
+    """Record a contrary, from its onset and the action's end; none while that holds, or held and is over."""
     if not seen.observed:
         return monitor
     holds = seen.holds is Truth.TRUE and not seen.decisive
     if seen.contrary is None or holds or (monitor.held and seen.unreached is not None):
         return replace(monitor, contrary=None, contrary_since=None)
-    since = max(monitor.entered, seen.contrary.since)
-    if monitor.held_at is not None and not seen.decisive:
-        since = max(since, monitor.held_at)
+    left = monitor.entered if seen.decisive or monitor.held_at is None else monitor.held_at
+    since = max(monitor.entered, left, seen.contrary.since)
     if monitor.contrary == seen.contrary.name and monitor.contrary_since is not None:
         since = min(since, monitor.contrary_since)
     return replace(
