@@ -18,8 +18,8 @@ from visup.percepts.appearance.background.point_tracking import STILL
 from visup.percepts.appearance.models.pose import Bytes, Doubles
 
 NOISE = 8.0
-"""Grey levels: noise of the differences that move a tracked point. Measured on 36 rendered clips: the median
-error along each axis of the structure tensor is 5.6 over the root of its eigenvalue, from 0.03 to 0.7 px."""
+"""Grey levels: noise of the differences that move a tracked point. On 36 rendered clips the median error
+along each axis of the structure tensor is 5 to 8 over the root of its eigenvalue, from 0.03 to 0.7 px."""
 FLOOR_PX = 0.15  # least standard deviation of a point, pixels
 PERSPECTIVE = 0.05
 """Share of its shift by which a point departs from a similarity when the camera turns."""
