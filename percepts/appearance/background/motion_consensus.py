@@ -149,9 +149,10 @@ def covariance_at(grey: Bytes, points: NDArray[np.float32], window: int) -> Doub
         window: Side of the tracked window, pixels.
     """
     reach = window // 2 + 1
-    wide = np.pad(grey, reach, mode="edge").astype(np.float32)
+    wide = np.pad(grey, reach, mode="edge")
     x, y = np.clip(np.round(points.T).astype(int), 0, np.reshape(grey.shape[::-1], (2, 1)) - 1)
-    around = np.lib.stride_tricks.sliding_window_view(wide, (2 * reach + 1, 2 * reach + 1))[y, x]
+    windows = np.lib.stride_tricks.sliding_window_view(wide, (2 * reach + 1, 2 * reach + 1))
+    around = windows[y, x].astype(np.float32)
     dx, dy = _slope(around), _slope(around.swapaxes(1, 2)).swapaxes(1, 2)
     xx, xy, yy = (
         (a * b).sum(axis=(1, 2), dtype=np.float64) for a, b in ((dx, dx), (dx, dy), (dy, dy))
