@@ -12,7 +12,8 @@ import pytest
 from typer.testing import CliRunner
 
 from tests.oracles.reasoning import relations
-from visup.commands.eval.catalogue import EVALUATIONS, eval_app
+from visup.commands.eval.catalogue import EVALUATIONS
+from visup.commands.eval.catalogue import app as eval_app
 from visup.commands.eval.evaluation import EvaluationCommand
 
 
@@ -29,7 +30,7 @@ def test_figures_are_printed_and_written(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(relations, "speed", partial(relations.speed, frames=62, rounds=1))
     file = tmp_path / "figures.json"
     arguments = ["relations", "--draws", "5", "--minutes", "0.1", "--json", str(file)]
-    done = CliRunner().invoke(eval_app(), arguments)
+    done = CliRunner().invoke(eval_app, arguments)
     assert done.exit_code == 0, done.output
     assert "of 5 random pairs, RCC-8 is wrong in 0, QTC in 0" in done.output
     record = json.loads(file.read_text())
@@ -39,5 +40,5 @@ def test_figures_are_printed_and_written(tmp_path: Path, monkeypatch: pytest.Mon
 
 
 def test_a_missing_folder_is_refused_before_the_evaluation(tmp_path: Path) -> None:
-    done = CliRunner().invoke(eval_app(), ["motion", str(tmp_path / "nothing")])
+    done = CliRunner().invoke(eval_app, ["motion", str(tmp_path / "nothing")])
     assert "there is no such folder" in str(done.exception)

@@ -87,16 +87,6 @@ def test_the_table_of_commands_names_every_command() -> None:
     assert [c for c in commands if f"`visup {c}" not in told] == []
 
 
-def test_help_shows_every_command_by_its_purpose() -> None:
-    from typer.main import get_command
-
-    from visup.cli import app
-    from visup.terminal.overview import PURPOSES
-
-    shown = [name for commands in PURPOSES.values() for name in commands]
-    assert sorted(shown) == sorted(getattr(get_command(app), "commands"))  # noqa: B009
-
-
 def test_the_site_has_every_page() -> None:
     text = (ROOT / "mkdocs.yml").read_text()
     pages = {p.relative_to(ROOT / "docs").as_posix() for p in (ROOT / "docs").rglob("*.md")}

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from visup.agent import Contract
     from visup.agent.plugins.factory import BehaviourFactory
 
-app = typer.Typer(no_args_is_help=True)
+app = typer.Typer(no_args_is_help=True, help="List, check and create behaviours (plug-ins).")
 
 TEMPLATE = '''\
 """The behaviour `{name}`: say here in one line what it perceives.

@@ -13,7 +13,10 @@ if TYPE_CHECKING:
     from visup.percepts.video import VideoSource
     from visup.runs.runner import RunProgress
 
-app = typer.Typer(no_args_is_help=True)
+app = typer.Typer(
+    no_args_is_help=True,
+    help="Visualise intermediate results, for developers of visup.",
+)
 
 MAX_WIDTH = 1284
 """Width of the video, pixels: two panels and the gap between them."""

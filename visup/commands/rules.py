@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from visup.agent import Mind
     from visup.rules.formula.nodes import Rule
 
-app = typer.Typer(no_args_is_help=True)
+app = typer.Typer(no_args_is_help=True, help="Check, list and explain safety rules.")
 
 Files = Annotated[
     list[Path] | None, typer.Argument(help="Rule files; by default the shipped rules.")

@@ -1,61 +1,96 @@
-"""What `visup --help` shows: the commands grouped by purpose, one line each."""
+"""The top of a command line: commands grouped by purpose, each imported when it is called."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from importlib import import_module
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
+import typer
 from typer import BadParameter
 from typer.core import TyperGroup
+from typer.main import get_command
 
-PURPOSES: Mapping[str, Mapping[str, str]] = MappingProxyType(
-    {
-        "Watch": {
-            "watch": "watch a video and report whether the work goes well",
-            "demo": "watch the shipped clip, a failed capture",
-            "check": "check that a run could start and reach a verdict",
-            "serve": "watch many cameras as a service, from a site file",
-            "presets": "what --preset traffic, cell, orbit and bench set",
-        },
-        "Prepare": {
-            "teach": "outline objects once, so that they are recognised",
-            "models": "build, extend, list and query model databases",
-            "task": "check, show, simulate and learn task files",
-            "rules": "check, list and explain safety rules",
-        },
-        "Inspect a run": {
-            "console": "browse runs: video, timeline, beliefs, reasons",
-            "step": "step back and forth through a run, and ask why",
-            "replay": "reason again about a run, with other tasks or rules",
-            "export": "export objects as MOT, COCO, FiftyOne or CSV",
-        },
-        "Query many runs": {
-            "archive": "watch many clips and store their runs in a lake",
-            "query": "query a lake in SQL",
-            "find": "find where a condition held, in all runs of a lake",
-        },
-        "Extend and measure": {
-            "behaviours": "list, check and create plug-ins",
-            "render": "render a scene with masks and ground truth",
-            "eval": "measure accuracy and speed against ground truth",
-            "train": "learn from labelled sequences what moves independently",
-            "debug": "visualise intermediate results, for developers",
-            "doctor": "show what is installed, what is missing, how fast it runs",
-        },
-    }
-)
+
+class CommandEntry(NamedTuple):
+    """A command or group of commands."""
+
+    summary: str
+    """One line for the overview."""
+    target: str
+    """`module:name` of a function, or of a `typer.Typer`."""
+    command_class: str = "typer.core:TyperCommand"
+    """`module:name` of the class by which the function's arguments are parsed."""
+
+
+Purposes = Mapping[str, Mapping[str, CommandEntry]]
+"""Purpose -> name of a command -> the command."""
+
+
+class LazyCommands(Mapping[str, Any]):
+    """The commands by name; a command is imported when it is asked for.
+
+    To import and put together all of them takes longer than most commands take.
+    """
+
+    def __init__(self, entries: Mapping[str, CommandEntry]) -> None:
+        self._entries = entries
+        self._imported: dict[str, Any] = {}
+
+    def __getitem__(self, name: str) -> Any:
+        entry = self._entries[name]
+        if name not in self._imported:
+            self._imported[name] = _imported(name, entry)
+        return self._imported[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._entries)
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+
+def _imported(name: str, entry: CommandEntry) -> Any:
+    app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
+    app.callback()(_group)
+    defined = _at(entry.target)
+    if isinstance(defined, typer.Typer):
+        app.add_typer(defined, name=name)
+    else:
+        app.command(name, cls=_at(entry.command_class))(defined)
+    group: Any = get_command(app)
+    return group.commands[name]
+
+
+def _group() -> None:
+    """With a function of its own, an app of one command remains a group."""
+
+
+def _at(target: str) -> Any:
+    module, _, name = target.partition(":")
+    return getattr(import_module(module), name)
 
 
 class Overview(TyperGroup):
-    """The top of the command line; its help shows commands by their purpose."""
+    """The top of a command line; its help shows commands by their purpose, one line each."""
+
+    purposes: Purposes = MappingProxyType({})
+
+    def __init__(self, **attributes: Any) -> None:
+        entries = {k: entry for group in self.purposes.values() for k, entry in group.items()}
+        super().__init__(**{**attributes, "commands": LazyCommands(entries)})
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """The names, for which nothing need be imported."""
+        return list(self.commands)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write the commands."""
-        for purpose, commands in PURPOSES.items():
+        for purpose, commands in self.purposes.items():
             with formatter.section(purpose):
-                formatter.write_dl(list(commands.items()))
+                formatter.write_dl([(name, entry.summary) for name, entry in commands.items()])
 
     def make_context(self, *arguments: Any, **options: Any) -> Any:
         """As usual, but error messages about bad arguments are made printable."""

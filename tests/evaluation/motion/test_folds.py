@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from tests.percepts.motion.clips import clip, texture
 from visup.agent.model.errors import SettingsError, SourceError
-from visup.commands.eval.catalogue import eval_app
+from visup.commands.eval.catalogue import app as eval_app
 from visup.evaluation.cross_validation.runner import FoldPlan, evaluate_folds, parse_changes
 from visup.evaluation.families import family_of, mean_and_spread
 from visup.evaluation.motion.folds import assign_folds, gains, select_settings
@@ -166,14 +166,14 @@ def test_changed_settings_are_compared_with_earlier_figures(
     cache = ["--cache", str(tmp_path / "kept"), "--limit", "6"]
     arguments = ["motion", str(tmp_path / "set"), "--folds", "2", *cache]
     first = tmp_path / "first.json"
-    result = CliRunner().invoke(eval_app(), [*arguments, "--json", str(first)])
+    result = CliRunner().invoke(eval_app, [*arguments, "--json", str(first)])
     assert result.exit_code == 0, result.output
     assert "over 3 sequences of 2 families" in result.output
     record = json.loads(first.read_text())
     for item in record["items"].values():
         item["J"] -= 0.1
     first.write_text(json.dumps(record))
-    result = CliRunner().invoke(eval_app(), [*arguments, "--against", str(first)])
+    result = CliRunner().invoke(eval_app, [*arguments, "--against", str(first)])
     assert "gain +0.100 +- 0.000: more than its spread" in result.output
 
 
@@ -183,5 +183,5 @@ def test_malformed_figures_and_fold_options_without_folds_are_refused(tmp_path: 
     malformed.write_text("[1, 2]")
     with pytest.raises(SourceError, match="cannot be read"):
         evaluate_folds(tmp_path / "set", FoldPlan(2, tmp_path / "kept", against=malformed))
-    result = CliRunner().invoke(eval_app(), ["motion", str(tmp_path / "set"), "--stability"])
+    result = CliRunner().invoke(eval_app, ["motion", str(tmp_path / "set"), "--stability"])
     assert isinstance(result.exception, SettingsError)

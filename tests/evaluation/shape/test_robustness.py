@@ -17,7 +17,7 @@ from tests.oracles.shape.robustness import (
 )
 from tests.percepts.shape.shapes import ZOO
 from visup.agent.model.errors import DatabaseError, SettingsError
-from visup.commands.eval.catalogue import eval_app
+from visup.commands.eval.catalogue import app as eval_app
 from visup.percepts.shape.database.model_database import ModelDatabase
 from visup.percepts.shape.silhouette.silhouette import normalise
 
@@ -93,7 +93,7 @@ def test_integer_masks_are_read_as_zero_or_not(dtype: str) -> None:
 
 
 def test_the_command_prints_a_table() -> None:
-    result = CliRunner().invoke(eval_app(), ["robustness", "--files", "12", "--masks", "12"])
+    result = CliRunner().invoke(eval_app, ["robustness", "--files", "12", "--masks", "12"])
     assert result.exit_code == 0, result.output
     assert "flipped" in result.output
     assert "refused" in result.output

@@ -53,7 +53,7 @@ FILL_SETTINGS = (
 )
 """Settings that apply to every clip, without those for live sources or single clips."""
 
-app = typer.Typer(no_args_is_help=True)
+app = typer.Typer(no_args_is_help=True, help="Lakes: many recorded runs, stored as tables.")
 
 
 @dataclass(frozen=True, slots=True)

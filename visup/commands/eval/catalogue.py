@@ -11,9 +11,6 @@ from visup.commands.eval.scene_evaluations import SCENE_EVALUATIONS
 EVALUATIONS = (MOTION, *SCENE_EVALUATIONS, *MACHINERY_EVALUATIONS)
 
 
-def eval_app() -> typer.Typer:
-    """The commands of `visup eval`."""
-    app = typer.Typer(no_args_is_help=True)
-    for evaluation in EVALUATIONS:
-        app.command(evaluation.name)(evaluation.command())
-    return app
+app = typer.Typer(no_args_is_help=True, help="Measure accuracy and speed against ground truth.")
+for _evaluation in EVALUATIONS:
+    app.command(_evaluation.name)(_evaluation.command())

@@ -32,7 +32,7 @@ class SiteGroup(TyperGroup):
         return super().parse_args(ctx, args)
 
 
-app = typer.Typer(no_args_is_help=True, cls=SiteGroup)
+app = typer.Typer(no_args_is_help=True, cls=SiteGroup, help="Watch many cameras as a service.")
 
 
 @app.command(RUN)
