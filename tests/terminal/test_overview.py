@@ -62,3 +62,14 @@ def test_a_misspelt_command_is_answered_with_the_nearest() -> None:
     done = CliRunner().invoke(app, ["presests"])
     assert done.exit_code == 2
     assert "Did you mean 'presets'?" in done.output
+
+
+def test_a_shell_completes_commands_and_their_own_commands() -> None:
+    def completed(words: str) -> set[str]:
+        asked = {"_VISUP_COMPLETE": "complete_bash", "COMP_WORDS": words}
+        asked["COMP_CWORD"] = str(words.count(" "))
+        done = CliRunner().invoke(app, [], prog_name="visup", env=asked)
+        return set(done.output.split())
+
+    assert completed("visup re") == {"render", "replay"}
+    assert {"check", "learn", "simulate"} <= completed("visup task ")

@@ -53,7 +53,7 @@ class LazyCommands(Mapping[str, Any]):
 
 
 def _imported(name: str, entry: CommandEntry) -> Any:
-    app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
+    app = typer.Typer(rich_markup_mode=None)
     app.callback()(_group)
     defined = _at(entry.target)
     if isinstance(defined, typer.Typer):
