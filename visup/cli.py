@@ -64,7 +64,7 @@ def options(
 
 @cache
 def command() -> Callable[[], object]:
-    """The command with its groups, which take typer longer to put together than most commands take."""
+    """The command, made once: what is called from Python again is not put together again."""
     return get_command(app)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from importlib import import_module
+from pkgutil import resolve_name
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -55,22 +55,17 @@ class LazyCommands(Mapping[str, Any]):
 def _imported(name: str, entry: CommandEntry) -> Any:
     app = typer.Typer(rich_markup_mode=None)
     app.callback()(_group)
-    defined = _at(entry.target)
+    defined = resolve_name(entry.target)
     if isinstance(defined, typer.Typer):
         app.add_typer(defined, name=name)
     else:
-        app.command(name, cls=_at(entry.command_class))(defined)
+        app.command(name, cls=resolve_name(entry.command_class))(defined)
     group: Any = get_command(app)
     return group.commands[name]
 
 
 def _group() -> None:
     """With a function of its own, an app of one command remains a group."""
-
-
-def _at(target: str) -> Any:
-    module, _, name = target.partition(":")
-    return getattr(import_module(module), name)
 
 
 class Overview(TyperGroup):
